@@ -14,7 +14,7 @@ from ligature.bundle import meant
 from ligature.cli.numbers import counted
 from ligature.model import reach
 from ligature.model.scene import Scene
-from ligature.physics import overlaps, springs
+from ligature.physics import inertias, overlaps, springs
 from ligature.physics.engine import Engine
 
 _STYLES = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.INFO: "", Severity.DEBUG: "dim"}
@@ -61,7 +61,7 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
         scene = ligature.load(file, models, roots=roots)
     except ligature.SceneError as error:
         return list(error.diagnostics)
-    later = [*reach.findings(scene), *_at_start(scene), *_shaders(scene, resolver)]
+    later = [*reach.findings(scene), *inertias.findings(scene), *_at_start(scene), *_shaders(scene, resolver)]
     return _distinct([*document.diagnostics, *scene.diagnostics, *later])
 
 

@@ -21,6 +21,7 @@ from ligature.model.frames import inverse, matrix_quaternion
 from ligature.model.mechanism import Chain, chain_of
 from ligature.model.scene import Articulation, Body, Closure, JointType, Scene
 from ligature.physics import shapes
+from ligature.physics.inertias import LEAST_INERTIA, inertia_of
 from ligature.physics.response import moved_inertias
 
 Array = NDArray[np.float64]
@@ -30,9 +31,6 @@ LIGHT = 1e-3
 
 POINT = 1e-3
 """Mass of the end of a point-to-point joint that slides along what the other joints hold, as a part of its body's."""
-
-LEAST_INERTIA = 1e-12
-"""Moments below this (kg·m²) are replaced by those of a 1 cm ball: Bullet cannot invert them."""
 
 LIMIT_SLACK = 1e-9
 """Travel in metres or radians beyond a limit: a joint at rest exactly on it would cost Bullet a constraint row."""
@@ -280,12 +278,6 @@ def is_point(scene: Scene, closure: Closure) -> bool:
 def needs_link(scene: Scene, closure: Closure) -> bool:
     """Whether a closing joint moves along axes of its own; a point that is held in all directions does not."""
     return not is_point(scene, closure) or len(closure.free) in (1, 2)
-
-
-def inertia_of(body: Body) -> Array:
-    """Principal moments (3,) that Bullet can invert: those given, or a 1 cm ball's where they are zero."""
-    ball = 0.4 * max(body.mass, 1e-6) * 0.01**2
-    return np.where(body.inertia > LEAST_INERTIA, body.inertia, ball) if body.mass > 0 else np.zeros(3)
 
 
 def _inertia_on(body: Body, steps: Sequence[Axis], dt: float) -> Array:

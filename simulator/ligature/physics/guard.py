@@ -14,7 +14,7 @@ from ligature.kernels import compiled
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Body, Joint, JointType, Scene
 from ligature.model.state import StateRecord
-from ligature.physics.articulation import inertia_of
+from ligature.physics.inertias import inertia_of
 from ligature.physics.overlaps import DEEP
 from ligature.physics.world import World
 

@@ -104,9 +104,9 @@ class Joints:
         control.set_state([control.row[joint]], [position], velocity)
 
     def axis(self, joint: int) -> int:
-        """Number of a joint's axis among those of the world, -1 for a joint that closes a loop."""
-        control = self._control_of.get(joint)
-        return -1 if control is None else control.first_axis + control.row[joint]
+        """Number of a joint's axis among those of the world; raises KeyError for a joint that closes a loop."""
+        control = self._control_of[joint]
+        return int(control.first_axis + control.row[joint])
 
     def stop(self, joint: int, position: float, effort: float) -> None:
         """Stop a joint at ``position`` whatever its command, until `resume`; it reports ``effort``."""

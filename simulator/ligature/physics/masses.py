@@ -13,10 +13,11 @@ import pybullet
 from numpy.typing import NDArray
 
 from ligature.model.subsystem import kept, put_back
-from ligature.physics.articulation import inertia_of, is_alone
+from ligature.physics.articulation import is_alone
 from ligature.physics.bodies import Placement
 from ligature.physics.body_commands import BodyCommands
 from ligature.physics.engine import Engine
+from ligature.physics.inertias import inertia_of
 from ligature.physics.trees import push_bodies
 from ligature.physics.welds import Welds
 

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.model.scene import Scene
-from ligature.physics.articulation import MOST_DAMPED, STIFFEST, Tree, inertia_of
+from ligature.physics.articulation import MOST_DAMPED, STIFFEST, Tree
+from ligature.physics.inertias import inertia_of
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,59 @@
+"""Moments of inertia as Bullet can bear them. Kilograms, kg m²."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.adf import Diagnostic, Severity
+from ligature.model.scene import Body, Scene
+
+Array = NDArray[np.float64]
+
+LEAST_INERTIA = 1e-15
+"""Smallest principal moment of a moving body, in kg m²: that of a steel needle of 0.03 mm wire, 1 mm long.
+
+Bullet (`btMultiBody::solveImatrix` and its joints) lets nothing turn whose moment is below the rounding of 1,
+2.2e-16: torques on it are lost. Measured by `tests/physics/test_inertias.py`.
+"""
+
+BALL = 0.01
+"""Radius in metres of the ball whose moments a body gets that has none."""
+
+
+def inertia_of(body: Body) -> Array:
+    """Principal moments (3,) that Bullet can invert: its own, at least `LEAST_INERTIA`, or a ball's."""
+    if body.mass <= 0.0:
+        return np.zeros(3)
+    ball = 0.4 * max(body.mass, 1e-6) * BALL**2
+    return np.where(body.inertia > 0.0, np.maximum(body.inertia, LEAST_INERTIA), ball)
+
+
+def findings(scene: Scene) -> list[Diagnostic]:
+    """Moving bodies outside rods whose moments are replaced.
+
+    Moments that are too small are a warning. A body without any, which has neither shape nor ``inertia``, is a detail:
+    the simulator has to choose some.
+    """
+    found = []
+    for body in scene.bodies:
+        used = inertia_of(body)
+        if body.index in scene.rod_bodies or body.mass <= 0.0 or (used == body.inertia).all():
+            continue
+        none = not body.inertia.any()
+        message = (
+            f"the principal moments of body '{body.identity.key}' are {_listed(body.inertia)} kg m²; "
+            f"{_listed(used)} kg m² are simulated"
+        )
+        hint = (
+            f"give 'inertia'; these are a ball's of {BALL * 100:g} cm radius"
+            if (body.inertia <= 0.0).any()
+            else f"moments below {LEAST_INERTIA:g} kg m² cannot be simulated"
+        )
+        severity = Severity.DEBUG if none else Severity.WARNING
+        found.append(Diagnostic(severity, message, body.identity.mark, hint, "inertia"))
+    return found
+
+
+def _listed(moments: Array) -> str:
+    return ", ".join(f"{moment:.3g}" for moment in moments)

@@ -1,0 +1,100 @@
+"""Small moments of inertia, against the closed forms of free bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from ligature import Simulation
+from ligature.cli.check import findings
+from ligature.model.frames import pose7_matrix
+from ligature.physics.inertias import LEAST_INERTIA, inertia_of
+
+Make = Callable[[str], Simulation]
+Moments = tuple[float, float, float]
+
+FREE = (
+    "gravity: {{x: 0, y: 0, z: 0}}\nbodies: [Floor, Needle]\nFloor: {{name: Floor, mass: 0, location: {{}}}}\n"
+    "Needle: {{name: Needle, mass: {mass}, gravity: {{x: 0, y: 0, z: 0}}, inertial offset: {{}}, damping: {{linear: 0, angular: 0}}, "
+    "inertia: {{ix: {0}, iy: {1}, iz: {2}}}}}\n"
+)
+
+ONCE = settings(
+    max_examples=25,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+
+
+@st.composite
+def moments(draw: st.DrawFn) -> Moments:
+    """Moments that a solid can have, from those of a needle of 0.03 mm wire on; the smallest first."""
+    least = 10.0 ** draw(st.floats(-14.99, -7.0))
+    middle = least * draw(st.floats(1.0, 500.0))
+    return least, middle, draw(st.floats(max(middle - least, middle), middle + least))
+
+
+@given(own=moments(), mass=st.floats(1e-9, 1e-3), axis=st.integers(0, 2))
+@ONCE
+def test_a_moment_turns_a_free_needle_as_its_inertia_states(
+    own: Moments, mass: float, axis: int, simulate: Make
+) -> None:
+    simulation = simulate(FREE.format(*own, mass=mass))
+    needle = simulation.bodies["Needle"]
+    torque = np.zeros(3)
+    torque[axis] = 30.0 * own[axis] / simulation.dt  # for 30 rad/s after a tick
+    needle.command_wrench([0.0, 0.0, 0.0, *torque])
+    simulation.step()
+    needle.command_wrench([0.0] * 6)
+    turn = simulation.state["body_twist"][0, needle.body.index, 3:].copy()
+    assert turn == pytest.approx(torque * simulation.dt / np.array(own), rel=1e-6)
+    simulation.step(100)
+    assert simulation.state["body_twist"][0, needle.body.index, 3:] == pytest.approx(turn, rel=1e-6)
+    simulation.close()
+
+
+@given(size=st.floats(-14.9, -8.0), ratio=st.floats(1.0, 1.9))
+@ONCE
+def test_the_axis_of_a_symmetric_needle_goes_round_its_momentum(size: float, ratio: float, simulate: Make) -> None:
+    """Goldstein, Classical Mechanics, section 5.6: the angular velocity turns about the axis at (I₃ − I₁)/I₁ ω₃."""
+    across = 10.0**size
+    along = ratio * across
+    simulation = simulate(FREE.format(across, across, along, mass=1e-6))
+    needle = simulation.bodies["Needle"]
+    start = np.array([1.0, 0.0, 20.0])
+    needle.command_wrench([0.0, 0.0, 0.0, *(start * np.array([across, across, along]) / simulation.dt)])
+    simulation.step()
+    needle.command_wrench([0.0] * 6)
+    T0 = pose7_matrix(needle.pose)[:3, :3]
+    w0 = T0.T @ simulation.state["body_twist"][0, needle.body.index, 3:]
+    ticks = 100
+    simulation.step(ticks)
+    w = pose7_matrix(needle.pose)[:3, :3].T @ simulation.state["body_twist"][0, needle.body.index, 3:]
+    angle = (along - across) / across * w0[2] * ticks * simulation.dt
+    expected = [w0[0] * np.cos(angle) - w0[1] * np.sin(angle), w0[0] * np.sin(angle) + w0[1] * np.cos(angle), w0[2]]
+    assert w == pytest.approx(expected, abs=0.05)
+    simulation.close()
+
+
+@pytest.mark.parametrize(
+    ("own", "used", "text"),
+    [
+        ((1e-12, 1e-12, 1e-12), (1e-12, 1e-12, 1e-12), ""),
+        ((3e-17, 1e-12, 1e-12), (LEAST_INERTIA, 1e-12, 1e-12), "moments below 1e-15 kg m² cannot be simulated"),
+        ((0.0, 1e-12, 1e-12), (4e-11, 1e-12, 1e-12), "give 'inertia'; these are a ball's of 1 cm radius"),
+    ],
+)
+def test_moments_that_are_replaced_are_reported(
+    own: Moments, used: Moments, text: str, simulate: Make, tmp_path: Path
+) -> None:
+    simulation = simulate(FREE.format(*own, mass=1e-6))
+    assert inertia_of(simulation.scene.bodies[1]) == pytest.approx(used)
+    simulation.close()
+    found = [d for d in findings(tmp_path / "model.yaml", [], False) if d.code == "inertia"]
+    assert [str(d).rpartition("; ")[2] for d in found] == ([text.rpartition("; ")[2]] if text else [])
+    assert all("body 'Needle'" in d.message and d.mark is not None and d.mark.line == 5 for d in found)
