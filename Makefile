@@ -12,6 +12,8 @@ PATHS ?= 200
 RELEASES ?= 100
 COMMANDS ?= 1000000
 KILLS ?= 200
+PLACINGS ?= 200
+SIGNALS ?= 40
 PAGE_MESSAGES ?= 3000
 BPY    ?= 4.2.23 4.5.15 5.0.1
 NEWEST_BPY := $(lastword $(BPY))
@@ -94,6 +96,8 @@ fuzz: developers
 	$(PYTHON) -m tests.fuzz.release --trials $(RELEASES)
 	$(PYTHON) -m tests.fuzz.commands --commands $(COMMANDS)
 	$(PYTHON) -m tests.fuzz.kills --kills $(KILLS)
+	$(PYTHON) -m tests.fuzz.placing --trials $(PLACINGS)
+	$(PYTHON) -m tests.fuzz.signals --rounds $(SIGNALS)
 	$(PYTHON) -m tests.fuzz.page $(PAGE_MESSAGES)
 	LIGATURE_EXAMPLES=new $(PYTHON) -m pytest -q tests/cockpit/test_intake.py $(shell grep -rl "from hypothesis" tests --include="test_*.py")
 

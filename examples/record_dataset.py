@@ -86,7 +86,7 @@ def main() -> int:
     given = arguments.parse_args()
     cameras = () if given.no_cameras else tuple(given.camera or ("cameraL", "cameraR"))
     simulation = ligature.Simulation(ligature.load(SCENE))
-    start, done, ended, stopped = simulation.snapshot(), 0, 0, ""
+    start, done, ended, stopped = simulation.snapshot(), 0, 0, 0
     try:
         with interrupted_once():
             try:
@@ -99,14 +99,14 @@ def main() -> int:
                         scatter(simulation, seed)
                         done += record(writer, simulation, given.throws, seed)
                         ended += 1
-            except KeyboardInterrupt:
-                stopped = "interrupted"
+            except KeyboardInterrupt as interrupt:
+                (stopped,) = interrupt.args  # the signal
     except (DatasetError, KeyError, ValueError) as error:
         print(error)
         return 2
     if stopped:
         print(f"interrupted; the {ended} episodes that ended are in {given.out}" if ended else "interrupted")
-        return 130
+        return 128 + stopped
     print(f"{given.out}: {done} of {given.episodes} sutures succeeded, {given.out.stat().st_size / 1e6:.1f} MB")
     return 0 if done == given.episodes else 1
 

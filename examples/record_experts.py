@@ -74,7 +74,7 @@ def main() -> int:
     arguments.add_argument("--camera", action="append", default=[], help="repeatable; none by default")
     given = arguments.parse_args()
     env, steps = SuturingEnv(given.task, max_steps=MOST), phases(given.task)
-    begin, done, ended = time.perf_counter(), 0, 0
+    begin, done, ended, stopped = time.perf_counter(), 0, 0, 0
     try:
         with interrupted_once():
             try:
@@ -86,13 +86,14 @@ def main() -> int:
                     for seed in range(given.seed, given.seed + given.episodes):
                         done += record(env, writer, seed, given.noise)
                         ended += 1
-            except KeyboardInterrupt:
+            except KeyboardInterrupt as interrupt:
+                (stopped,) = interrupt.args  # the signal
                 print("interrupted")
     except (DatasetError, KeyError) as error:
         print(error)
         return 2
     print(f"{given.out}: {done} of {ended} demonstrations succeeded, in {time.perf_counter() - begin:.0f} s")
-    return 0 if ended == given.episodes else 130
+    return 128 + stopped if stopped else 0
 
 
 if __name__ == "__main__":

@@ -9,10 +9,16 @@ import ctypes
 import os
 import signal
 import sys
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
 
 _GROUP_TRIES, _GROUP_PAUSE = 4, 0.11
 
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_IMPORT_SYSTEM = "<frozen importlib._bootstrap>"
 _PR_SET_PDEATHSIG = 1
 _prctl = ctypes.CDLL(None).prctl
 
@@ -27,6 +33,42 @@ def end_with_parent(parent: int | None = None) -> None:
     _prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:
         sys.exit(0)
+
+
+def amid_import(frame: FrameType | None) -> bool:
+    """Whether ``frame`` was called by the import system, which loses what a handler raises while it releases a lock."""
+    while frame is not None:
+        if frame.f_code.co_filename == _IMPORT_SYSTEM:
+            return True
+        frame = frame.f_back
+    return False
+
+
+@contextmanager
+def signals_held() -> Iterator[None]:
+    """Signals that end this process wait until the block has ended, and with it the files that it writes.
+
+    For blocks of milliseconds. On other threads than the main one, which alone sets handlers, it has no effect.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    arrived: list[int] = []
+
+    def hold(number: int, frame: FrameType | None) -> None:
+        arrived.append(number)
+
+    before = {number: signal.getsignal(number) for number in _ENDING}
+    heard = {number: handler for number, handler in before.items() if handler not in (signal.SIG_IGN, None)}
+    try:
+        for number in heard:
+            signal.signal(number, hold)
+        yield
+    finally:
+        for number, handler in heard.items():
+            signal.signal(number, handler)
+        if arrived:
+            signal.raise_signal(arrived[0])
 
 
 def lower_priority(nice: int) -> None:

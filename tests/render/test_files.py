@@ -10,7 +10,7 @@ import OpenEXR
 import pytest
 from ligature import Simulation
 from ligature.render import Frame
-from ligature.render.files import DEPTH_STEP, write_frame
+from ligature.render.files import DEPTH_STEP, write_frame, write_json
 from PIL import Image
 
 from tests.render.conftest import LENS, camera
@@ -55,3 +55,17 @@ def test_nothing_half_written_stays_when_a_file_cannot_take_its_name(frame: Fram
     with pytest.raises(OSError, match=last.name):
         write_frame(frame, tmp_path, "C", format)
     assert last.is_dir() and not [path.name for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+@pytest.mark.parametrize("name", ["x" * 255, "ß" * 127], ids=["letters", "two bytes each"])
+def test_a_file_may_have_any_name_that_the_system_takes(name: str, tmp_path: Path) -> None:
+    assert write_json([1], tmp_path / name).read_text() == "[\n 1\n]"
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("where", ["a file/in it", "missing/in it", "y" * 256], ids=["a file", "nothing", "too long"])
+def test_what_cannot_be_written_is_named_as_the_user_named_it(where: str, tmp_path: Path) -> None:
+    (tmp_path / "a file").write_text("")
+    with pytest.raises(OSError) as caught:
+        write_json([1], tmp_path / where)
+    assert caught.value.filename == str(tmp_path / where)

@@ -13,8 +13,14 @@ import io
 import os
 import signal
 import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
+
+from ligature.process import amid_import
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of writing to a full disk."""
@@ -25,7 +31,12 @@ GONE = (errno.EPIPE, errno.EIO)
 LONG = 120
 """Characters of a path that a message quotes."""
 
-_IMPORT_SYSTEM = "<frozen importlib._bootstrap>"
+INTERRUPT_TIMEOUT = 1.0
+"""Seconds in which the main thread takes an interrupt, wherever it is."""
+
+_TIMEOUT_LOOK = 0.02
+
+_taken = False
 
 
 def ligature() -> None:
@@ -55,12 +66,60 @@ def _run(module: str) -> None:
         _fail(text)
     except OSError as error:
         _end(error)
+    except KeyboardInterrupt:  # before the command line is read
+        end_by(signal.SIGINT)
 
 
 def take_interrupts() -> None:
     """Have SIGINT end this process wherever it arrives; see above."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # ignored, as under nohup, it stays ignored
         signal.signal(signal.SIGINT, _interrupt)
+        _Deadline().start()
+
+
+class _Deadline(threading.Thread):
+    """Ends this process when its main thread has not taken an interrupt in time.
+
+    Python calls handlers between two of its own instructions: a kernel that LLVM compiles meanwhile takes many seconds.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(name="interrupts", daemon=True)
+        self._reader, writer = os.pipe2(os.O_CLOEXEC)
+        os.set_blocking(writer, False)
+        signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+        os.register_at_fork(after_in_child=_forget_wakeups)
+
+    def run(self) -> None:
+        """Read the numbers of signals as they arrive, whatever the main thread does."""
+        while numbers := os.read(self._reader, 1):
+            if numbers[0] != signal.SIGINT or signal.getsignal(signal.SIGINT) is not _interrupt:
+                continue
+            deadline = time.monotonic() + INTERRUPT_TIMEOUT
+            while not _taken and time.monotonic() < deadline:
+                time.sleep(_TIMEOUT_LOOK)
+            if not _taken:
+                os._exit(128 + signal.SIGINT)
+
+
+def _forget_wakeups() -> None:
+    """Leave the pipe to the parent: what a forked process gets does not concern it."""
+    signal.set_wakeup_fd(-1)
+
+
+@contextmanager
+def ending_in_order() -> Iterator[None]:
+    """The first SIGTERM within raises SystemExit, so that the block ends the processes that it has started."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        raise SystemExit(128 + number)
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def end_by(number: int) -> NoReturn:
@@ -113,8 +172,8 @@ def open_null(number: int) -> None:
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
     """End the process amid an import, as if SIGINT had no handler; elsewhere raise `KeyboardInterrupt`."""
-    while frame is not None:
-        if frame.f_code.co_filename == _IMPORT_SYSTEM:
-            end_by(number)
-        frame = frame.f_back
+    global _taken
+    _taken = True  # no lock: a second signal may interrupt this
+    if amid_import(frame):
+        end_by(number)
     raise KeyboardInterrupt

@@ -18,6 +18,7 @@ from ligature.authoring.save import SaveError, checked_text, save_all
 from ligature.authoring.xml_files import XmlError, check_xml
 from ligature.cli.numbers import counted
 from ligature.paths import real_path, reason
+from ligature.process import signals_held
 
 MODELS = (".yaml", ".yml", ".ambf")
 READ = (".urdf", ".sdf", ".world", ".xml", *MODELS)
@@ -41,7 +42,8 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
     try:
         check_xml(source)
         converted = _robot(source)
-        written = save_all(_files(converted, real_path(out), namespace))
+        with signals_held():
+            written = save_all(_files(converted, real_path(out), namespace))
     except (SaveError, PatchError, MeshWriteError) as error:
         console.print(f"{source}: it cannot be written as ADF: {error}", style="red", markup=False)
         return 1
@@ -104,7 +106,8 @@ def _export(source: Path, out: Path, console: Console) -> int:
         done = exported(document, resolver, out.stem)
         text, notes = WRITTEN[out.suffix.lower()](done.robot)
         folder = real_path(out).parent
-        written = save_all({**{folder / n: data for n, data in done.files.items()}, real_path(out): text.encode()})
+        with signals_held():
+            written = save_all({**{folder / n: data for n, data in done.files.items()}, real_path(out): text.encode()})
     except (AdfError, SaveError) as error:
         console.print(str(error), style="red", markup=False)
         return 1

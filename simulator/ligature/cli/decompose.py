@@ -13,6 +13,7 @@ from ligature.mesh import load_mesh
 from ligature.mesh.decompose import decompose as cut
 from ligature.mesh.decompose import obj_text
 from ligature.paths import real_path
+from ligature.process import signals_held
 
 
 def decompose(mesh: Path, out: Path | None, threshold: float, max_hulls: int, console: Console) -> int:
@@ -22,7 +23,8 @@ def decompose(mesh: Path, out: Path | None, threshold: float, max_hulls: int, co
     try:
         result = cut(load_mesh(real_path(mesh), Resolver([real_path(mesh).parent])), threshold, max_hulls)
         text, materials = obj_text(result.hulls, library.name)
-        save_all({real_path(library): materials.encode(), real_path(target): text.encode()})
+        with signals_held():
+            save_all({real_path(library): materials.encode(), real_path(target): text.encode()})
     except SaveError as error:
         console.print(str(error), style="red", markup=False)
         return 1

@@ -6,6 +6,7 @@ import runpy
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import FrameType
 
@@ -17,6 +18,19 @@ from ligature.cli.sampling import Sampling
 from ligature.process import end_with_parent
 
 EXAMPLE = EXAMPLES / "suture.py"
+_ENDING = (signal.SIGINT, signal.SIGTERM)
+
+_NAP = 0.05
+"""Seconds between two looks at whether the example has ended."""
+
+_LAUNCH = """
+import signal
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
+from ligature.cli.demo import play
+play()
+"""
+"""Until an example runs, a signal ends its process without a word."""
 
 
 def demo(
@@ -47,31 +61,36 @@ def demo(
 def _wait(command: list[str]) -> int:
     """Run a Python program to its end; signals go to it, so that it ends in order. Returns a shell's exit status."""
     process: subprocess.Popen[bytes] | None = None
+    early: list[int] = []
 
     def forward(number: int, frame: FrameType | None) -> None:
-        if process is not None:
+        if process is None:
+            early.append(number)
+        else:
             process.send_signal(number)
 
-    before = {number: signal.signal(number, forward) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, forward) for number in _ENDING}
     try:
-        process = subprocess.Popen([sys.executable, "-m", "ligature.cli.demo", *command], preexec_fn=end_with_parent)
-        status = process.wait()
+        signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)  # in the new process, until it can take them
+        process = subprocess.Popen([sys.executable, "-c", _LAUNCH, *command], preexec_fn=end_with_parent)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
+        for number in early:
+            process.send_signal(number)
+        while (status := process.poll()) is None:
+            time.sleep(_NAP)  # a signal that another thread takes does not end a wait of the main thread
         return status if status >= 0 else 128 - status
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
-def _play(program: str) -> None:
-    """Run a program as Python does; an interrupt ends it without a traceback."""
-    take_interrupts()
-    sys.path[0] = str(Path(program).parent)
-    try:
-        runpy.run_path(program, run_name="__main__")
-    except KeyboardInterrupt:
-        end_by(signal.SIGINT)
-
-
-if __name__ == "__main__":
+def play() -> None:
+    """Run the program that the arguments name as Python does; an interrupt ends it without a traceback."""
     del sys.argv[0]
-    _play(sys.argv[0])
+    sys.path[0] = str(Path(sys.argv[0]).parent)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    take_interrupts()
+    try:
+        runpy.run_path(sys.argv[0], run_name="__main__")
+    except KeyboardInterrupt as interrupt:
+        end_by(interrupt.args[0] if interrupt.args else signal.SIGINT)

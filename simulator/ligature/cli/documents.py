@@ -18,6 +18,7 @@ from ligature.mesh.inertia import MassProperties, mass_properties
 from ligature.mesh.load import EXTENSIONS, load_mesh
 from ligature.mesh.surface import joined
 from ligature.paths import real_path
+from ligature.process import signals_held
 
 
 def fmt(files: Sequence[Path], check: bool, lossy: bool, console: Console) -> int:
@@ -60,7 +61,8 @@ def _lost(document: Document) -> str:
 
 def _save(file: Path, text: str, console: Console) -> int:
     try:
-        save_all({real_path(file): checked_text(text, file)})
+        with signals_held():
+            save_all({real_path(file): checked_text(text, file)})
     except SaveError as error:
         console.print(str(error), style="red", markup=False)
         return 1

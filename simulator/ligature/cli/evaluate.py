@@ -11,6 +11,7 @@ from PIL import Image
 from rich.console import Console
 
 from ligature import __version__
+from ligature.cli.command import ending_in_order
 from ligature.cli.evaluation_page import write_page
 from ligature.environments import SuturingEnv
 from ligature.environments.evaluation import MEASURES, UNITS, Episode, report, run_episode, run_episodes
@@ -36,7 +37,8 @@ def evaluate(
     try:
         steps = max_steps or GOALS.get(options["task"], Goal).steps
         load_policy(policy)  # what is wrong with it is said before anything is simulated
-        episodes = _run(policy, options, seeds, steps, jobs, console)
+        with ending_in_order():
+            episodes = _run(policy, options, seeds, steps, jobs, console)
         found = report(policy, options, episodes, __version__)
         _print(found["summary"], console)
         if out is not None:

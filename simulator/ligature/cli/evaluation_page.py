@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ligature.environments.evaluation import UNITS
+from ligature.render.files import staged
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 70rem; padding: 0 1rem; }
@@ -35,7 +36,8 @@ def write_page(report: Mapping[str, Any], pictures: Sequence[tuple[int, Sequence
         _summary(report["summary"]), *(_figures(seed, files) for seed, files in pictures),
         _episodes(report["episodes"]), "</body></html>",
     ]  # fmt: skip
-    path.write_text("\n".join(text), "utf-8")
+    with staged(path) as part:
+        part.write_text("\n".join(text), "utf-8")
     return path
 
 

@@ -14,6 +14,7 @@ import ligature
 from ligature.adf import AdfError
 from ligature.authoring.save import SaveError, save_all
 from ligature.cli.numbers import counted
+from ligature.process import signals_held
 
 PROGRESS_SECONDS = 0.5
 """Seconds between two lines ``N of M frames``, which editors show as progress."""
@@ -54,7 +55,8 @@ def poses(
     data = io.BytesIO()
     np.savez(data, identifiers=np.array(names), times=times, poses=np.array(frames))
     try:
-        save_all({out: data.getvalue()})
+        with signals_held():
+            save_all({out: data.getvalue()})
     except SaveError as error:
         console.print(str(error), style="red", markup=False)
         return 1

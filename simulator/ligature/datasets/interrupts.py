@@ -7,38 +7,57 @@ kept and interrupts afterwards.
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-_ENDING = (signal.SIGINT, signal.SIGTERM)
+from ligature.process import amid_import
+
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_LATER = 0.02
+"""Seconds after which an interrupt tries again that was lost, or that came amid an import."""
+
 _writing = 0
-_kept = False
+_kept = 0
 
 
 @contextmanager
 def interrupted_once() -> Iterator[None]:
-    """The first SIGINT or SIGTERM within raises KeyboardInterrupt; others are ignored until the block has ended.
+    """The first SIGINT, SIGTERM or SIGHUP within raises KeyboardInterrupt; others are ignored until the block ends.
 
-    For the main thread of a program.
+    The exception has the number of the signal as its argument. Where it is lost, as in an object's clean-up or a
+    callback from C, it is raised again. For the main thread of a program.
     """
     global _kept
+    first: list[int] = []
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        global _kept
-        for each in _ENDING:
-            signal.signal(each, signal.SIG_IGN)
-        if _writing:
-            _kept = True
-        else:
-            raise KeyboardInterrupt
+        if not first:
+            first.append(number)
+            again(number, frame)
 
-    _kept = False
-    before: dict[int, Any] = {number: signal.signal(number, interrupt) for number in _ENDING}
+    def again(number: int, frame: FrameType | None) -> None:
+        global _kept
+        if isinstance(sys.exc_info()[1], KeyboardInterrupt):
+            return  # it is on its way out
+        if _writing:
+            _kept = first[0]
+            return
+        signal.setitimer(signal.ITIMER_REAL, _LATER)
+        if not amid_import(frame):
+            raise KeyboardInterrupt(first[0])
+
+    _kept = 0
+    alarm = signal.signal(signal.SIGALRM, again)
+    heard = [number for number in _ENDING if signal.getsignal(number) is not signal.SIG_IGN]  # as under nohup
+    before: dict[int, Any] = {number: signal.signal(number, interrupt) for number in heard}
     try:
         yield
     finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, alarm)
         for number, handler in before.items():
             signal.signal(number, handler)
 
@@ -53,5 +72,5 @@ def uninterrupted() -> Iterator[None]:
     finally:
         _writing -= 1
     if _kept and not _writing:
-        _kept = False
-        raise KeyboardInterrupt
+        number, _kept = _kept, 0
+        raise KeyboardInterrupt(number)

@@ -5,10 +5,11 @@ Depth in metres, or in steps of `DEPTH_STEP` in the 16 bits of a PNG, where 0 is
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from PIL import Image
 
 from ligature.model.optics import Calibration
 from ligature.paths import naming
+from ligature.process import signals_held
 from ligature.render.target import Frame
 
 FORMATS = ("npy", "png", "exr")
@@ -27,14 +29,20 @@ DEPTH_STEP = 1e-4
 
 @contextmanager
 def staged(path: Path) -> Iterator[Path]:
-    """A file beside ``path`` to write to, which takes its name when all is written; nothing half-written has it."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        with naming(path):
+    """A file beside ``path`` to write to, which takes its name when all is written; nothing half-written has it.
+
+    Its name is short, whatever that of ``path`` is, and of this process alone. A signal waits until it is written or
+    removed. An OSError within names ``path``.
+    """
+    part = path.with_name(f".{hashlib.sha1(os.fsencode(path.name)).hexdigest()[:16]}.{os.getpid()}.part")
+    with naming(path), signals_held():
+        try:
             yield part
             os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+        except BaseException:
+            with suppress(OSError):  # where nothing can be written, nothing can be removed
+                part.unlink(missing_ok=True)
+            raise
 
 
 def write_json(values: Any, path: Path) -> Path:

@@ -1,0 +1,48 @@
+"""Interrupts of programs that record."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+LOST = """
+import os, signal, sys, weakref
+from ligature.datasets.interrupts import interrupted_once, uninterrupted
+
+class Held:
+    pass
+
+def lose(_):
+    os.kill(os.getpid(), signal.{name})
+    sum(range(1000))
+
+ended = []
+try:
+    with interrupted_once():
+        held = Held()
+        watch = weakref.ref(held, lose)
+        try:
+            del held
+            while True:
+                pass
+        finally:
+            for name in ("SIGTERM", "SIGINT", "SIGHUP"):
+                os.kill(os.getpid(), getattr(signal, name))
+            for _ in range(3 * 10**6):
+                pass
+            ended.append("cleaned up")
+except KeyboardInterrupt as interrupt:
+    print(*ended, *interrupt.args)
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_an_interrupt_that_is_lost_comes_again_and_never_into_the_clean_up(name: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOST.replace("{name}", name)], capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout == f"cleaned up {int(getattr(signal, name))}\n", done.stderr
+    assert done.returncode == 0
