@@ -417,10 +417,11 @@ class Simulation:
     def set_pose(self, body: int, pose: Array) -> None:
         """Move the root body of a tree to ``pose`` (7,), at rest, together with a thread that is attached to it alone.
 
-        Raises ValueError for a body that a joint holds, such as a link of an arm.
+        Raises ValueError for a body that a joint holds, such as a link of an arm, and for an element of a thread.
         """
         self._check_open()
-        BodyCommand(body, CommandType.POSITION, tuple(pose)).check()
+        BodyCommand(body, CommandType.POSITION, tuple(pose)).check(self._counts)
+        self._world.check_root(body)
         before = pose7_matrix(self._world.pose7(body))
         self.grasps.release_body(body)
         self._world.set_pose(body, pose)

@@ -323,13 +323,20 @@ class World(Subsystem):
         read_bodies(motions.handle, motions.table, engine.place_table, bodies, out)
 
     def set_pose(self, body: int, pose: Array) -> None:
-        """Put the root body of a tree at ``pose`` (7,), at rest; raises ValueError for a body that joints hold."""
-        place = self.engine.place_of[body]
-        if place.link >= 0:
-            name = self.scene.bodies[body].identity.identifier
-            raise ValueError(f"body '{name}' is held by joints; set its joints, or the pose of its root")
-        place.set_pose(pose)
+        """Put the root body of a tree at ``pose`` (7,), at rest; raises ValueError as `check_root`."""
+        self.check_root(body)
+        self.engine.place_of[body].set_pose(pose)
         self._parting.begin()
+
+    def check_root(self, body: int) -> None:
+        """Raise ValueError for a body that is not the root of a tree: joints hold it, or it is a part of a thread."""
+        place = self.engine.place_of.get(body)
+        if place is not None and place.link < 0:
+            return
+        name = self.scene.bodies[body].identity.identifier
+        if place is None:
+            raise ValueError(f"body '{name}' is an element of a thread; set the pose of a body at an end of it")
+        raise ValueError(f"body '{name}' is held by joints; set its joints, or the pose of its root")
 
     def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:
         """Set a joint to a position and velocity at once, without dynamics."""
