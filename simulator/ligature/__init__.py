@@ -5,10 +5,14 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from ligature import blas
+
 if TYPE_CHECKING:
     from ligature.camera_simulation import Simulation
     from ligature.model.load import SceneError, load
     from ligature.model.scene import Scene
+
+blas.pin()  # before NumPy is imported, where it is not yet
 
 __version__ = "0.2.0"
 

@@ -6,6 +6,7 @@ x y z qx qy qz qw; ``T_a_b`` (4, 4) is frame b in frame a. Metres and radians.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ _IDENTITY = np.eye(4)
 
 def rpy_matrix(r: float, p: float, y: float) -> Array:
     """Rotation (3, 3) of an orientation block."""
-    cr, sr, cp, sp, cy, sy = np.cos(r), np.sin(r), np.cos(p), np.sin(p), np.cos(y), np.sin(y)
+    cr, sr, cp, sp, cy, sy = math.cos(r), math.sin(r), math.cos(p), math.sin(p), math.cos(y), math.sin(y)
     return np.array(
         [
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -33,10 +34,10 @@ def rpy_matrix(r: float, p: float, y: float) -> Array:
 
 def matrix_rpy(R: Array) -> tuple[float, float, float]:
     """An orientation block of the rotation ``R`` (3, 3), with p in -pi/2 … pi/2."""
-    p = float(np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])))
-    if np.hypot(R[0, 0], R[1, 0]) < 1e-12:
-        return float(np.arctan2(-R[1, 2], R[1, 1])), p, 0.0
-    return float(np.arctan2(R[2, 1], R[2, 2])), p, float(np.arctan2(R[1, 0], R[0, 0]))
+    p = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
+    if math.hypot(R[0, 0], R[1, 0]) < 1e-12:
+        return math.atan2(-R[1, 2], R[1, 1]), p, 0.0
+    return math.atan2(R[2, 1], R[2, 2]), p, math.atan2(R[1, 0], R[0, 0])
 
 
 def pose_matrix(xyz: ArrayLike, rpy: ArrayLike) -> Array:
@@ -68,7 +69,7 @@ def axis_rotation(axis: ArrayLike, angle: float) -> Array:
     """Rotation (3, 3) by ``angle`` about the unit vector ``axis`` (Rodrigues)."""
     x, y, z = np.asarray(axis, dtype=float)
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    R: Array = np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
+    R: Array = np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K)
     return R
 
 
@@ -117,13 +118,13 @@ def minimal_rotation(u: ArrayLike, v: ArrayLike) -> Array:
     """Rotation (3, 3) that turns ``u`` to ``v``, with the format's choice for (anti)parallel axes."""
     a = np.asarray(u, dtype=float) / np.linalg.norm(u)
     b = np.asarray(v, dtype=float) / np.linalg.norm(v)
-    angle = float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
+    angle = math.acos(np.clip(a @ b, -1.0, 1.0))
     if angle < PARALLEL:
         return axis_rotation((0.0, 0.0, 1.0), angle)
     if angle <= ANTIPARALLEL:
         axis = np.cross(a, b)
     else:
-        to_x = float(np.arccos(np.clip(a[0], -1.0, 1.0)))
+        to_x = math.acos(np.clip(a[0], -1.0, 1.0))
         axis = np.cross(a, (1.0, 0.0, 0.0)) if PARALLEL < to_x < ANTIPARALLEL else np.cross(b, (0.0, 1.0, 0.0))
     return axis_rotation(axis / np.linalg.norm(axis), angle)
 

@@ -5,6 +5,7 @@ World axes, metres, radians.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import cached_property
 
@@ -154,7 +155,7 @@ class Hand:
         The jaws are alike: half a turn about the tool changes nothing.
         """
         a = self.arc.angle(0.5 * self.arc.length)
-        out, along = np.array([np.cos(a), np.sin(a), 0.0]), np.array([-np.sin(a), np.cos(a), 0.0])
+        out, along = np.array([math.cos(a), math.sin(a), 0.0]), np.array([-math.sin(a), math.cos(a), 0.0])
         T, tool = self.needle_arc, self.tool
         x = T[:3, :3] @ along
         x -= (x @ UP) * UP
@@ -186,7 +187,7 @@ class Hand:
         arc_tool = inverse(self.needle_arc) @ self.measured_tool
         needle = self.tool @ inverse(arc_tool)
         tip = throw.axes.T @ ((needle @ frame(np.eye(3), self.arc.tip))[:3, 3] - throw.centre)
-        angle = (float(np.arctan2(tip[1], tip[0])) - FIRST) % (2.0 * np.pi) + FIRST
+        angle = (math.atan2(tip[1], tip[0]) - FIRST) % (2.0 * np.pi) + FIRST
         beside = apart(throw.arc_at(angle, self.arc), needle)
         angle = min(angle + TURN * float(np.clip(2.0 - beside / BESIDE, 0.0, 1.0)), last)
         return self.action(throw.arc_at(angle, self.arc) @ arc_tool, SHUT)[0]

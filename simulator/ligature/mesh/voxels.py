@@ -128,7 +128,7 @@ def lattice(
 
 def usual_cell(vertices: Array, held: bool) -> float:
     """Edge of a cell, m, of tissue whose file states none: about `HELD_CELLS` cells, fewer where nothing holds it."""
-    return float(np.cbrt(np.prod(np.ptp(vertices, axis=0)) / (HELD_CELLS if held else FREE_CELLS))) or 1e-3
+    return float(np.prod(np.ptp(vertices, axis=0)) / (HELD_CELLS if held else FREE_CELLS)) ** (1.0 / 3.0) or 1e-3
 
 
 def _lattice(low: float, high: float, cell: float, planes: Sequence[float]) -> Array:

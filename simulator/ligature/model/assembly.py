@@ -7,6 +7,7 @@ frame, A and B are a joint's frames; metres, radians.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -102,7 +103,8 @@ def motion(axes: Sequence[Axis], values: Array) -> Array:
 
 
 def _angle(R: Array) -> float:
-    return 2.0 * float(np.arctan2(np.linalg.norm(matrix_quaternion(R)[:3]), abs(matrix_quaternion(R)[3])))
+    q = matrix_quaternion(R)
+    return 2.0 * math.atan2(np.linalg.norm(q[:3]), abs(q[3]))
 
 
 def assemble(

@@ -6,6 +6,7 @@ on real pictures wants its own calibration (``camera intrinsics`` of the format)
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,12 +28,12 @@ class Endoscope:
     @property
     def focal_length(self) -> float:
         """Focal length in pixels, which are square."""
-        return float(np.hypot(*self.resolution) / 2 / np.tan(self.diagonal_view / 2))
+        return math.hypot(*self.resolution) / 2 / math.tan(self.diagonal_view / 2)
 
     @property
     def field_of_view(self) -> float:
         """Vertical field of view, the format's ``field view angle``."""
-        return float(2 * np.arctan(self.resolution[1] / 2 / self.focal_length))
+        return 2 * math.atan(self.resolution[1] / 2 / self.focal_length)
 
 
 _VIDEO = "dVRK wiki, Video Pipeline, and jhu-dvrk/dvrk-ros, dvrk_robot/video.md"

@@ -6,6 +6,7 @@ around an opening and a flat ghost in it. ``ligature hole`` on a ghost reports i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -75,6 +76,6 @@ def _ringed(colliders: Sequence[Collider], T_body_hole: Array, half: Array) -> b
         return False
     if np.any(distance > 3.0 * half.max()):
         return False
-    around = np.sort(np.arctan2(centres[:, 1], centres[:, 0]))
+    around = np.array(sorted(math.atan2(y, x) for x, y, _ in centres.tolist()))
     gaps = np.diff(np.append(around, around[0] + 2.0 * np.pi))
     return bool(gaps.max() < np.pi)

@@ -6,6 +6,7 @@ In all that is compared, lengths are divided by the size of the mechanism. I is 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -385,4 +386,4 @@ def rotation(vector: Array) -> Array:
 def _rotation_vector(R: Array) -> Array:
     q = matrix_quaternion(R)
     sine = float(np.linalg.norm(q[:3]))
-    return np.zeros(3) if sine < 1e-12 else q[:3] / sine * 2.0 * np.arctan2(sine, q[3])
+    return np.zeros(3) if sine < 1e-12 else q[:3] / sine * 2.0 * math.atan2(sine, q[3])

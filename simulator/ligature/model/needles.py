@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -42,11 +43,11 @@ def fit_arc(points: Array) -> Arc:
     flat = (points - middle) @ axes[:2].T
     u, v, radius = _circle(flat)
     # Angles from the middle of the arc, so that none of them lies across the seam.
-    towards = np.arctan2(-v, -u)
-    angles = np.arctan2(flat[:, 1] - v, flat[:, 0] - u) - towards
+    towards = math.atan2(-v, -u)
+    angles = np.array([math.atan2(y - v, x - u) for x, y in flat.tolist()]) - towards
     angles = (angles + np.pi) % (2.0 * np.pi) - np.pi
-    x = np.cos(towards) * axes[0] + np.sin(towards) * axes[1]
-    y = np.cos(towards) * axes[1] - np.sin(towards) * axes[0]
+    x = math.cos(towards) * axes[0] + math.sin(towards) * axes[1]
+    y = math.cos(towards) * axes[1] - math.sin(towards) * axes[0]
     if angles[-1] < angles[0]:
         y, angles = -y, -angles
     centre = middle + u * axes[0] + v * axes[1]

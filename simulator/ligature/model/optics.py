@@ -7,6 +7,7 @@ OpenCV: the middle of a picture w wide is (w - 1) / 2. Metres and radians.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -30,7 +31,7 @@ EYES = ("left", "right")
 _PARALLEL = 1e-9
 _SIDE = re.compile(r"left|Left|LEFT|L(?![a-z])|(?<![A-Za-z])l(?![A-Za-z])")
 _OTHER = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "L": "R", "l": "r"}
-_MOST_TURNED = np.cos(np.radians(30.0))
+_MOST_TURNED = math.cos(math.radians(30.0))
 """Cosine of the largest angle between two cameras of a pair, and between their baseline and image right."""
 
 

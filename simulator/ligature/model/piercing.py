@@ -5,6 +5,7 @@ Frames as in `ligature.model.scene`: B body frame, I inertial frame.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +37,7 @@ class Arc:
     def point(self, depth: float) -> Array:
         """The point (3,) from which ``depth`` metres of needle are left to the tip."""
         angle = self.end - depth / self.radius
-        return np.asarray(self.centre + self.radius * (np.cos(angle) * self.x + np.sin(angle) * self.y))
+        return np.asarray(self.centre + self.radius * (math.cos(angle) * self.x + math.sin(angle) * self.y))
 
 
 @dataclass(frozen=True, eq=False)

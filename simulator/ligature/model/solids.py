@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,8 +34,8 @@ def _points(shape: Box | Sphere | Cylinder | Capsule | Cone | Hull) -> Array:
     if isinstance(shape, Box):
         signs = np.array(np.meshgrid([-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5])).reshape(3, -1).T
         return np.asarray(signs * shape.size)
-    angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
-    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(AROUND)])
+    angles = (2.0 * np.pi * np.arange(AROUND) / AROUND).tolist()
+    circle = np.array([(math.cos(angle), math.sin(angle), 0.0) for angle in angles])
     if isinstance(shape, Cylinder):
         up = np.array([0.0, 0.0, 0.5 * shape.height])
         return np.vstack([shape.radius * circle - up, shape.radius * circle + up])
@@ -41,7 +43,7 @@ def _points(shape: Box | Sphere | Cylinder | Capsule | Cone | Hull) -> Array:
         up = np.array([0.0, 0.0, 0.5 * shape.height])
         return np.vstack([shape.radius * circle - up, up])
     height = np.pi * (np.arange(1, UP) / UP - 0.5)
-    rings = [np.cos(h) * circle + [0.0, 0.0, np.sin(h)] for h in height]
+    rings = [math.cos(h) * circle + [0.0, 0.0, math.sin(h)] for h in height]
     ball = shape.radius * np.vstack([*rings, [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]])
     if isinstance(shape, Sphere):
         return np.asarray(ball)

@@ -8,6 +8,7 @@ Bullet would otherwise work through all links, in three rows a contact point.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -308,7 +309,7 @@ def _joint_type(axis: Axis) -> int:
 
 def decay_rate(damping: float) -> float:
     """Rate in 1/s of the velocity decay (1 − damping)^t (ADF specification §12.1)."""
-    return float(-np.log1p(-min(damping, 1.0 - 1e-9)))
+    return -math.log1p(-min(damping, 1.0 - 1e-9))
 
 
 def is_alone(tree: Tree, bodies: tuple[Body, ...]) -> bool:

@@ -5,6 +5,7 @@ Poses are those of the body frame B in world axes. Bullet has poses of the inert
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -230,7 +231,7 @@ def _difference(target: Array, pose: Array) -> Array:
     R = pose7_matrix(target)[:3, :3] @ pose7_matrix(pose)[:3, :3].T
     q = matrix_quaternion(R)
     sine = float(np.linalg.norm(q[:3]))
-    angle = 2.0 * np.arctan2(sine, q[3])
+    angle = 2.0 * math.atan2(sine, q[3])
     turn = np.zeros(3) if sine < 1e-12 else q[:3] / sine * angle
     return np.concatenate([target[:3] - pose[:3], turn])
 

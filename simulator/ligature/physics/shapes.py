@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -91,8 +92,8 @@ def hull_points(shape: Cone | Hull | TriMesh) -> list[Array]:
     if isinstance(shape, Hull):
         return [shape.vertices]
     if isinstance(shape, Cone):
-        angles = np.linspace(0, 2 * np.pi, CONE_FACETS, endpoint=False)
-        base = shape.radius * np.column_stack([np.cos(angles), np.sin(angles)])
+        angles = np.linspace(0, 2 * np.pi, CONE_FACETS, endpoint=False).tolist()
+        base = shape.radius * np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
         ring = np.column_stack([base, np.full(CONE_FACETS, -shape.height / 2)])
         return [np.vstack([ring, [0.0, 0.0, shape.height / 2]])]
     return convex_pieces(shape.vertices, shape.faces, shape.source)

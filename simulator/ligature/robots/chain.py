@@ -7,6 +7,7 @@ where the joint slides.
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +82,7 @@ class Chain:
         self._tip = np.array(T_last_tip, dtype=np.float64)
         self._modified = convention is Convention.MODIFIED
         self._table = np.array(
-            [[np.cos(k.alpha), np.sin(k.alpha), k.a, k.d, k.theta, float(k.prismatic)] for k in links]
+            [[math.cos(k.alpha), math.sin(k.alpha), k.a, k.d, k.theta, float(k.prismatic)] for k in links]
         )
 
     @property

@@ -8,6 +8,7 @@ convention): ``MTML.json`` and ``MTMR.json`` of the dVRK's sawIntuitiveResearchK
 
 from __future__ import annotations
 
+import math
 from types import MappingProxyType
 
 import numpy as np
@@ -35,8 +36,8 @@ JOINT_NAMES = (
 UPPER_ARM, FOREARM, FOREARM_RISE = 0.2794, 0.3645, 0.1506
 """Lengths in metres: shoulder to elbow, elbow to wrist along the forearm, and across it."""
 
-ELBOW_TO_WRIST = float(np.hypot(FOREARM, FOREARM_RISE))
-FOREARM_ANGLE = float(np.arctan2(FOREARM_RISE, FOREARM))
+ELBOW_TO_WRIST = math.hypot(FOREARM, FOREARM_RISE)
+FOREARM_ANGLE = math.atan2(FOREARM_RISE, FOREARM)
 
 PLATFORM, PITCH, YAW, ROLL = 3, 4, 5, 6
 

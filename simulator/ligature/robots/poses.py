@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -38,7 +40,7 @@ def rotation_vector(R: Array) -> Array:
     axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
     sine, cosine = float(np.linalg.norm(axis)), (float(np.trace(R)) - 1.0) / 2.0
     if sine > 1e-9:
-        return np.asarray(axis * (np.arctan2(sine, cosine) / sine))
+        return np.asarray(axis * (math.atan2(sine, cosine) / sine))
     if cosine > 0.0:
         return axis
     values, vectors = np.linalg.eigh((R + R.T) / 2.0)

@@ -91,7 +91,7 @@ class ScenePiercer:
     def __init__(self, scene: Scene, needle: Needle, block: TissueBlock, rod: Rod | None, dt: float) -> None:
         arc, self.body = needle.arc, scene.bodies[needle.body]
         self.rod, self._dt = rod, dt
-        tip, c, s = arc.point(0.0), np.cos(arc.end), np.sin(arc.end)
+        tip, c, s = arc.point(0.0), math.cos(arc.end), math.sin(arc.end)
         self._mount = _mount(np.stack([tip, c * arc.y - s * arc.x, (arc.centre - tip) / arc.radius], axis=1))
         self.tip, self.wrench = self._mount.tip, self._mount.wrench
         self.inside = block.add_needle(1.0 / arc.radius, arc.length, wire_radius(self.body))

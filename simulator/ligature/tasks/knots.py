@@ -5,6 +5,7 @@ Metres, newtons, world axes.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +79,7 @@ def _closed_below(half: Array, far: float = 1.0) -> Array:
 def turns(points: Array, centre: Array) -> float:
     """Turns that a thread (n, 3) makes around a vessel along x through ``centre`` (3,), positive from y to z."""
     way = points[:, 1:] - centre[1:]
-    angles = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+    angles = np.unwrap([math.atan2(z, y) for y, z in way.tolist()])
     return float(angles[-1] - angles[0]) / (2.0 * np.pi)
 
 

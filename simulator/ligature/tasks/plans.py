@@ -5,6 +5,7 @@ World axes, metres, radians; frames as in `ligature.tasks.throws`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
@@ -96,7 +97,7 @@ def _ends(scene: Scene, state: Any, search: Search) -> Iterator[tuple[Array, Arr
         middle = np.append(0.5 * (nodes.min(axis=0) + nodes.max(axis=0))[:2], nodes[:, 2].max())
         for x, y in product(search.asides, repeat=2):
             for azimuth in np.linspace(0.0, 2.0 * np.pi, search.turns, endpoint=False):
-                half = 0.5 * CHORD * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+                half = 0.5 * CHORD * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
                 yield middle + [x, y, 0.0] - half, middle + [x, y, 0.0] + half
         return
     for place in search.places:
@@ -171,12 +172,12 @@ class Planner:
     def exit(self, throw: Throw) -> Array:
         """Where a throw comes out (3,)."""
         a = throw.towards_exit
-        return np.asarray(throw.centre + self.arc.radius * (throw.axes @ [np.cos(a), np.sin(a), 0.0]))
+        return np.asarray(throw.centre + self.arc.radius * (throw.axes @ [math.cos(a), math.sin(a), 0.0]))
 
     def angle(self, state: Any, throw: Throw) -> float:
         """Where the needle's tip is on the circle of a throw: the angle past the entry, -1 to 2 pi - 1."""
         local = throw.axes.T @ (self.point(state, 0.0) - throw.centre)
-        return float((np.arctan2(local[1], local[0]) + 1.0) % (2.0 * np.pi) - 1.0)
+        return (math.atan2(local[1], local[0]) + 1.0) % (2.0 * np.pi) - 1.0
 
     def pick(self, state: Any, T_world_base: Array) -> Pick | None:
         """How the tool can take the needle where it is; None where it cannot.

@@ -7,6 +7,7 @@ along the axis of its jaw.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -77,7 +78,7 @@ class NeedleArc:
     def point(self, depth: float) -> Array:
         """The point (3,) of the centre line, in the arc frame, at which ``depth`` metres are left to the tip."""
         angle = self.angle(depth)
-        return self.radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+        return self.radius * np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,8 @@ class NeedleGrasp:
     def tool_in_arc(self, arc: NeedleArc) -> Array:
         """Pose (4, 4) of the tool in the arc frame."""
         a = arc.angle(self.depth)
-        out, along, normal = np.array([np.cos(a), np.sin(a), 0.0]), np.array([-np.sin(a), np.cos(a), 0.0]), [0.0, 0, 1]
+        c, s = math.cos(a), math.sin(a)
+        out, along, normal = np.array([c, s, 0.0]), np.array([-s, c, 0.0]), [0.0, 0.0, 1.0]
         R = np.column_stack([along, np.cross(normal, along), normal])
         R = R * [1.0, -1.0, -1.0] if self.below else R
         R = axis_rotation(out, self.pivot) @ axis_rotation(along, self.tilt) @ R
@@ -136,7 +138,7 @@ class Throw:
         x = (entry - centre) / radius
         axes = np.column_stack([x, np.cross(normal, x), normal])
         way = axes.T @ (exit - centre)
-        return cls(centre, normal, 0.0, float(np.arctan2(way[1], way[0]) % (2 * np.pi)), axes)
+        return cls(centre, normal, 0.0, math.atan2(way[1], way[0]) % (2 * np.pi), axes)
 
     def arc_at(self, tip: float, arc: NeedleArc) -> Array:
         """Pose (4, 4) of the arc frame with the tip at the angle ``tip`` past the entry."""

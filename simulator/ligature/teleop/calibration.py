@@ -5,6 +5,7 @@ The view frame is that of the picture: x to the operator's right, y down, z into
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -111,7 +112,7 @@ def axes_of_motions(right: Array, up: Array) -> Array:
                 f" move at least {1000 * SHORTEST:.0f} mm"
             )
     x, y = right / np.linalg.norm(right), -up / np.linalg.norm(up)
-    off = abs(float(np.arcsin(np.clip(x @ y, -1.0, 1.0))))
+    off = abs(math.asin(np.clip(x @ y, -1.0, 1.0)))
     if off > SQUARE:
         raise Unclear(f"right and up were {np.rad2deg(np.pi / 2 - off):.0f}° apart; they must be about 90°")
     U, _, Vt = np.linalg.svd(np.array([x, y, np.cross(x, y)]))

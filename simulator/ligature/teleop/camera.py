@@ -5,6 +5,7 @@ Poses are matrices (4, 4), metres and radians. The camera frame looks along +z, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -62,4 +63,4 @@ class CameraDrive:
         if min(np.linalg.norm(before), np.linalg.norm(after)) < 1e-3:
             return 0.0
         cross, dot = before[0] * after[1] - before[1] * after[0], float(before @ after)
-        return float(np.arctan2(cross, dot))
+        return math.atan2(cross, dot)

@@ -20,6 +20,7 @@ from ligature.tissue.layout import MOST_NODES, USED, Paths
 from ligature.tissue.location import cross_surface, locate
 from ligature.tissue.needle import begin_coupling, couple, end_coupling, look_for_surface, needle_arrays
 from ligature.tissue.paths import begin_path, extend_path
+from ligature.tissue.surface import mean_normal
 from ligature.tissue.tearing import tear
 
 Array = NDArray[np.float64]
@@ -201,16 +202,13 @@ class NeedleInTissue:
 
     def _steep(self) -> bool:
         sine = -float((self._shape[3:6] * self._held.normal).sum())
-        return sine >= float(np.sin(self._interface.material_of(self._held.tip[2]).least_angle))
+        return sine >= math.sin(self._interface.material_of(self._held.tip[2]).least_angle)
 
     def _normal_around(self, at: Array) -> Array:
         """Outward normal of the surface near a point of it, (3,)."""
-        corner = self._interface.elastic.x[self._interface.elastic.grid.faces]
-        area = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
-        away = ((corner.mean(axis=1) - at) ** 2).sum(axis=1)
-        facing = (area * self._normal).sum(axis=1) > 0.0
-        total = (area * (facing * np.exp(-away / AROUND**2))[:, None]).sum(axis=0)
-        return np.asarray(total / np.sqrt((total**2).sum()))
+        elastic, normal = self._interface.elastic, np.empty(3)
+        mean_normal(elastic.x, elastic.grid.faces, at, AROUND, self._normal, normal)
+        return normal
 
     def _opening(self, at: Array) -> tuple[int, int]:
         """Path that opens within reach of a point of the surface, and 1 at its entry, -1 at its exit."""
@@ -269,7 +267,7 @@ class NeedleInTissue:
     def follow(self) -> None:
         """Lay and move nodes; after the tissue has moved."""
         h = self._held
-        h.offset[:] *= np.exp(-self._interface.elastic.h / FADE)
+        h.offset[:] *= math.exp(-self._interface.elastic.h / FADE)
         tear(self._interface, self._paths, h.torn)
         h.engaged[self._interface.points.status != USED] = 0
         if h.tip[0] in (states.CUTS, states.TENTS):

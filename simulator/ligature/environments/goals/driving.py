@@ -5,6 +5,8 @@ World axes, metres, radians, simulated seconds.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -87,7 +89,7 @@ class Insert(Goal):
         """The needle's tip (3,), and its angle past the entry on the circle."""
         tip = self._points()[2]
         local = self.throw.axes.T @ (tip - self.throw.centre)
-        return tip, float(np.arctan2(local[1], local[0]))
+        return tip, math.atan2(local[1], local[0])
 
     def _look(self) -> tuple[bool, bool, float]:
         """Whether the needle went where it should, whether tissue has it, and the share of the way that it went."""
@@ -102,7 +104,7 @@ class Insert(Goal):
         return through and self._pair <= filled, bool(filled), entered
 
     def _on_circle(self, angle: float) -> Array:
-        local = self.arc.radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+        local = self.arc.radius * np.array([math.cos(angle), math.sin(angle), 0.0])
         return np.asarray(self.throw.centre + self.throw.axes @ local)
 
     def target(self) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -69,8 +71,8 @@ class HandOver(Goal):
 
     def _on_needle(self, depths: Array) -> Array:
         """The places (n, 3) of the needle, in its body frame, that are ``depths`` (n,) from its tip."""
-        angles = self.arc.end - depths / self.arc.radius
-        places = self.arc.radius * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
+        angles = (self.arc.end - depths / self.arc.radius).tolist()
+        places = self.arc.radius * np.array([(math.cos(angle), math.sin(angle), 0.0) for angle in angles])
         T = self.arc.T_body_arc
         return np.asarray(places @ T[:3, :3].T + T[:3, 3])
 

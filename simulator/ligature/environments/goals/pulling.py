@@ -5,6 +5,8 @@ World axes, metres, radians, simulated seconds.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -92,7 +94,7 @@ class PullThrough(Goal):
     def reached(self) -> float:
         """The angle of the needle's tip past the entry, on the throw's circle."""
         tip = self.throw.axes.T @ (self._points()[2] - self.throw.centre)
-        return float(np.arctan2(tip[1], tip[0])) % (2.0 * np.pi)
+        return math.atan2(tip[1], tip[0]) % (2.0 * np.pi)
 
     @property
     def out(self) -> float:
