@@ -67,14 +67,6 @@ def unexplained(thing: Any) -> list[str]:
     ]
 
 
-UNEXPLAINED = {
-    "ligature.physics.World", "ligature.physics.World.drive", "ligature.physics.World.set_pose",
-    "ligature.physics.World.set_joint_position", "ligature.physics.World.apply_force",
-    "ligature.physics.World.apply_impulse", "ligature.physics.failed", "ligature.physics.failure",
-}  # fmt: skip
-"""Public objects whose docstrings do not name all parameters yet."""
-
-
 def test_the_page_of_the_package_documents_all_that_it_exports() -> None:
     documented = re.findall(r"auto(?:class|function):: (ligature\.\w+)", reference.top())
     assert documented == sorted(documented, key=lambda name: name != "ligature.load")
@@ -90,7 +82,7 @@ def test_public_object_explains_its_parameters(name: str) -> None:
     thing = SURFACE[name]
     assert inspect.getdoc(thing), f"{name} has no docstring"
     unnamed = unexplained(thing) if len(parameters(thing)) > 1 else []
-    assert bool(unnamed) == (name in UNEXPLAINED), unnamed
+    assert unnamed == []
 
 
 @pytest.mark.parametrize("name", [name for name, thing in SURFACE.items() if not inspect.isclass(thing)])
@@ -102,9 +94,6 @@ def test_what_lists_parameters_describes_what_it_returns(name: str) -> None:
 
 ENDINGS = {"Exit", "BadParameter", "SystemExit", "StopIteration", "NotImplementedError", "KeyboardInterrupt"}
 """Exceptions that end a program or an iteration: callers do not handle them."""
-
-UNNAMED = {"hand.py: Hand.grasp", "rod.py: Rod.attach", "scripts.py: side_grasp", "suturing.py: SuturingEnv.save"}
-"""Functions whose docstrings do not name their exceptions yet."""
 
 
 def raised(function: ast.FunctionDef) -> set[str]:
@@ -141,7 +130,7 @@ def silent_raises(path: Path) -> Iterator[str]:
 
 def test_public_functions_name_the_exceptions_that_they_raise() -> None:
     files = (ROOT / "simulator" / "ligature").rglob("*.py")
-    assert {name for file in files for name in silent_raises(file)} == UNNAMED
+    assert {name for file in files for name in silent_raises(file)} == set()
 
 
 @pytest.mark.parametrize("what", ["attribute", "data", "property"])

@@ -133,7 +133,10 @@ class Hand:
         return frame(np.eye(3), np.array([x, y, z])) @ self.tool
 
     def grasp(self) -> Array:
-        """Pose (4, 4) of the tool at which the jaws can close on the needle from above."""
+        """Pose (4, 4) of the tool at which the jaws can close on the needle from above.
+
+        Raises ValueError where the arm reaches none.
+        """
         now = self.needle_arc
         raised = frame(np.eye(3), 0.03 * UP) @ now
         surface = self.simulation.state["body_pose"][0, self.needle, :3] - np.array([0.0, 0.0, 0.004])

@@ -87,7 +87,10 @@ def grasp_side(hand: Hand, goal: PegTransfer) -> Iterator[Array]:
 
 
 def side_grasp(hand: Hand, goal: PegTransfer) -> Array:
-    """Pose (4, 4) of the tool in the block that is farthest from the limits of its joints on the whole way."""
+    """Pose (4, 4) of the tool in the block that is farthest from the limits of its joints on the whole way.
+
+    Raises ValueError where the arm reaches no side of the block.
+    """
     best: tuple[float, Array] | None = None
     T_block, way = hand.needle_pose, goal.way()
     for wall in goal.walls():

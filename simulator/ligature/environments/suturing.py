@@ -393,7 +393,8 @@ driven, and taken by the second arm (``suture``) | |
         """Where the environment is, with its random numbers, for `restore` here or in another one like it.
 
         Bullet keeps contacts that nobody can read; this drops them here too, so that an episode goes on with the same
-        last bits as all that are restored from it, and with others than one that was never saved.
+        last bits as all that are restored from it, and with others than one that was never saved. Raises RuntimeError
+        before the first `reset`.
         """
         self._check_open()
         if self._progress is None:

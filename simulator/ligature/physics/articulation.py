@@ -38,7 +38,8 @@ LIMIT_SLACK = 1e-9
 
 
 STIFFEST, MOST_DAMPED = 16.0, 0.8
-"""A spring acts in full up to m / (16 dt²), a damper up to 0.8 m / dt (ADF specification §15.4)."""
+"""A spring acts in full up to m / (16 dt²), a damper up to 0.8 m / dt (as in Bullet's
+`btGeneric6DofSpring2Constraint`)."""
 
 
 @dataclass
@@ -285,7 +286,7 @@ def _inertia_on(body: Body, steps: Sequence[Axis], dt: float) -> Array:
     """`inertia_of` a body on the axes of its joint.
 
     Where the file leaves the inertia open it is large enough for the springs and dampers to act in full in
-    ticks of ``dt``; else they are capped (§15.4), and a tissue hole swings where its file makes it stiff.
+    ticks of ``dt``; else they are capped (`STIFFEST`), and a tissue hole swings where its file makes it stiff.
     """
     turning = [axis for axis in steps if not axis.prismatic]
     if not body.inertia_estimated or body.mass == 0.0 or not turning:
@@ -308,7 +309,7 @@ def _joint_type(axis: Axis) -> int:
 
 
 def decay_rate(damping: float) -> float:
-    """Rate in 1/s of the velocity decay (1 − damping)^t (ADF specification §12.1)."""
+    """Rate in 1/s of the velocity decay (1 − damping)^t (Bullet's `btRigidBody`)."""
     return -math.log1p(-min(damping, 1.0 - 1e-9))
 
 

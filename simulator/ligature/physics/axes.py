@@ -1,8 +1,8 @@
 """The law of every single axis of all joints, once a tick, as one compiled call. Radians, metres, N·m, N.
 
-The PID follows ADF specification §15.6 with its derivative taken implicitly: with velocity output
+The PID is that of AMBF with its derivative taken implicitly: with velocity output
 ``v = P e + I ∫e + D ė`` and ``ė = ṫ − v`` the joint's velocity is ``v = (P e + I ∫e + D ṫ) / (1 + D)``. Evaluated
-explicitly, as the reference does, a D near 1 chatters at the rate of the loop; the implicit form is the same law
+explicitly, as AMBF does, a D near 1 chatters at the rate of the loop; the implicit form is the same law
 without it.
 
 With force output the effort is ``P e + I ∫e + D (ṫ − v)``. It goes to a motor of that strength, whose velocity is the

@@ -1,4 +1,4 @@
-"""Single bodies in Bullet: poses, forces, and Cartesian control (ADF specification §13).
+"""Single bodies in Bullet: poses, forces, and Cartesian control (as in AMBF).
 
 Poses are those of the body frame B in world axes. Bullet has poses of the inertial frame I.
 """

@@ -78,7 +78,7 @@ class TreeControl:
         self.sort()
 
     def _spring_setup(self, owners: list[Joint]) -> None:
-        """Spring constants with the reference's caps: sampled at a quarter period, damped within a tick (§15.4)."""
+        """Spring constants with Bullet's caps: sampled at a quarter period, damped within a tick."""
         axes, own = [axis for _, _, axis, _ in self.tree.axes], self.axes
         moved = np.array([m for *_, m in self.tree.axes])
         crowd = self._dampers_on_a_body(owners)

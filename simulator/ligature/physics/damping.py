@@ -9,7 +9,7 @@ from ligature.physics.engine import Engine
 
 
 class Damping:
-    """The damping of lone bodies of an engine in a tick (ADF specification §12.1).
+    """The damping of lone bodies of an engine in a tick: (1 − damping)^dt (Bullet's `btRigidBody`).
 
     Attributes
     ----------

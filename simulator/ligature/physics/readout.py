@@ -24,7 +24,7 @@ Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 _REPORTED = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
-"""Joints whose position is reported; all others report 0 (ADF specification §15.5)."""
+"""Joints whose position is reported; all others report 0 (as in AMBF)."""
 
 
 class Rows(NamedTuple):

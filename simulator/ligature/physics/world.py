@@ -45,12 +45,12 @@ MOST_CHARACTERS = 300
 
 
 def failure(what: str, error: Exception) -> Diagnostic:
-    """The finding that ``what`` failed with an exception, and that its command is cleared therefore."""
+    """The finding that ``what`` failed with the exception ``error``, and that its command is cleared therefore."""
     return failed(f"{what} failed, and its command is cleared", error)
 
 
 def failed(what: str, error: Exception) -> Diagnostic:
-    """The finding that an exception was raised; ``what`` names where."""
+    """The finding that the exception ``error`` was raised; ``what`` names where."""
     text = f"{what}: {type(error).__name__}: {str(error)[:MOST_CHARACTERS]}"
     return Diagnostic(Severity.ERROR, text, code="failed")
 
@@ -83,7 +83,14 @@ class Controllers(Subsystem):
 
 
 class World(Subsystem):
-    """All rigid bodies of ``scene`` outside rods; one Bullet client of its own.
+    """All rigid bodies of a scene outside rods; one Bullet client of its own.
+
+    Parameters
+    ----------
+    scene
+        The description of bodies and joints.
+    dt
+        Length of a tick in seconds.
 
     Attributes
     ----------
@@ -171,7 +178,7 @@ class World(Subsystem):
     # --- commands ---------------------------------------------------------------------------
 
     def set_command(self, command: BodyCommand) -> None:
-        """Take a body command; it holds until the next one or `release` (interface reference §3.1, §3.2)."""
+        """Take a body command; it holds until the next one or `release` (as in AMBF)."""
         body = self.scene.bodies[command.body]
         if command.body in self.engine.place_of:
             before = self.driven(command.body)
@@ -204,7 +211,22 @@ class World(Subsystem):
     def drive(
         self, joints: Sequence[int], max_velocity: Array, max_deceleration: Array, yield_stiffness: float = 0.0
     ) -> Drive:
-        """The drive of ``joints``, all of one tree; see `Drive`."""
+        """The drive of some joints of one tree; see `Drive`.
+
+        Parameters
+        ----------
+        joints
+            Indices (n,) of the joints in the scene.
+        max_velocity, max_deceleration
+            Limits (n,) at which set-points are followed: rad/s or m/s, rad/s² or m/s².
+        yield_stiffness
+            Stiffness in N·m/rad with which motors yield to a load; 0 is as strong as they are.
+
+        Returns
+        -------
+        Drive
+            What commands and reads these joints.
+        """
         return Drive(self.joints, joints, max_velocity, max_deceleration, yield_stiffness)
 
     # --- the tick ---------------------------------------------------------------------------
@@ -323,7 +345,7 @@ class World(Subsystem):
         read_bodies(motions.handle, motions.table, engine.place_table, bodies, out)
 
     def set_pose(self, body: int, pose: Array) -> None:
-        """Put the root body of a tree at ``pose`` (7,), at rest; raises ValueError as `check_root`."""
+        """Put the root ``body`` of a tree at ``pose`` (7,), world axes, at rest; raises ValueError as `check_root`."""
         self.check_root(body)
         self.engine.place_of[body].set_pose(pose)
         self._parting.begin()
@@ -339,12 +361,12 @@ class World(Subsystem):
         raise ValueError(f"body '{name}' is held by joints; set its joints, or the pose of its root")
 
     def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:
-        """Set a joint to a position and velocity at once, without dynamics."""
+        """Set a ``joint`` at once to a ``position`` (rad or m) and ``velocity`` (per second), without dynamics."""
         self.joints.set_state(joint, position, velocity)
         self._parting.begin()
 
     def apply_force(self, body: int, force: Array, point: Array) -> None:
-        """Push a body with ``force`` (3,) at ``point`` (3,) during the coming tick."""
+        """Push a ``body`` with ``force`` (3,), N, at ``point`` (3,), m, in world axes during the coming tick."""
         self.engine.place_of[body].apply_force(force, point)
 
     def driven(self, body: int) -> bool:
@@ -352,7 +374,10 @@ class World(Subsystem):
         return self.commands.driven(body)
 
     def apply_impulse(self, body: int, impulse: Array, moment: Array) -> None:
-        """Change the momentum of a body in the coming tick; see `Impulses.apply`."""
+        """Change the momentum of a ``body`` in the coming tick, world axes; see `Impulses.apply`.
+
+        ``impulse`` (3,), N·s, acts at its centre of mass, ``moment`` (3,), N·m·s, about it.
+        """
         self.impulses.apply(body, impulse, moment)
 
     def attached_load(self, body: int) -> tuple[float, Array, Array]:

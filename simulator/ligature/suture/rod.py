@@ -459,7 +459,10 @@ class Rod:
         self._nodes.met[[node for _, node in partners]] = True
 
     def attach(self, element: int, body: int, T_element_a: Array, T_body_b: Array) -> None:
-        """Attach frame a of an element to frame b of a partner, (4, 4) in their frames B."""
+        """Attach frame a of an element to frame b of a partner, (4, 4) in their frames B.
+
+        Raises ValueError for a body that is no partner.
+        """
         if body not in self.node_of:
             raise ValueError(
                 f"rod '{self.description.name}' cannot be attached to body {body}: the body has no collision shape"
