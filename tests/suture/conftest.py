@@ -14,7 +14,8 @@ from ligature.model.scene import Body, Identity, Scene, WorldSettings
 from ligature.model.shapes import Collider, Shape
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, from_material
-from ligature.suture.rod import Partner, Rod
+from ligature.suture.partners import Partner
+from ligature.suture.rod import Rod
 
 DT = 1e-3
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from ligature.model.frames import matrix_pose7
 from ligature.suture.description import from_chain
-from ligature.suture.rod import Partner, Rod
+from ligature.suture.partners import Partner
+from ligature.suture.rod import Rod
 
 pytestmark = pytest.mark.corpus
 

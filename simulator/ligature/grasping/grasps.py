@@ -27,7 +27,7 @@ from ligature.model.state import FieldViews, StateRecord
 from ligature.model.subsystem import ALWAYS, Subsystem, kept, put_back
 from ligature.physics import World
 from ligature.suture import Rods
-from ligature.suture.rod import JawPads
+from ligature.suture.partners import JawPads
 
 Array = NDArray[np.float64]
 

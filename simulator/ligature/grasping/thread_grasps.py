@@ -1,6 +1,6 @@
 """Grasps of threads between the fingers of a jaw: rigid across the pads, frictional along them.
 
-Until both pads touch, the rod's own contacts with the fingers act. Then `ligature.suture.rod.Pads` replace them inside
+Until both pads touch, the rod's own contacts with the fingers act. Then `ligature.suture.partners.JawPads` replace them inside
 the rod's implicit solve; the force between the fingers sets their Coulomb limit. World axes, SI units.
 """
 
@@ -15,7 +15,8 @@ from ligature.grasping.fingers import FACING, LEAST_LEVER, TOUCH, Fingers
 from ligature.model.frames import pose7_matrix
 from ligature.physics import World
 from ligature.suture import Rods
-from ligature.suture.rod import JawPads, Rod
+from ligature.suture.partners import JawPads
+from ligature.suture.rod import Rod
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,6 @@ with the linear part at the centre of mass.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,10 +16,12 @@ from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, quat
 from ligature.model.poses import compose_rows
 from ligature.model.subsystem import kept, put_back
 from ligature.suture import layout
+from ligature.suture.assembly import chain_ends, chain_joints, chain_nodes, grasp_rows, point_constraint
 from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
-from ligature.suture.description import Attachment, RodDescription, frame_quaternions
+from ligature.suture.description import Attachment, RodDescription
 from ligature.suture.parting import depth_of, draw_out, find_inside
+from ligature.suture.partners import JawPads, Partner, PointConstraint
 from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import bounds, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
@@ -33,50 +34,8 @@ Array = NDArray[np.float64]
 INDENTATION = 0.05
 """Penetration depth of a contact under 1 N, in radii."""
 
-LOCKED = 1e6
-"""Stiffness in N m/rad of a locked joint axis."""
-
 MAX_SPEED = 1e4
 """Speed in m/s beyond which a rod counts as diverged."""
-
-
-@dataclass(frozen=True, eq=False)
-class Partner:
-    """A body outside the rod that it may be attached to or touch.
-
-    ``body`` is its index in the scene. The rod does not move ``fixed`` bodies, but they receive its reaction.
-    ``gravity`` (3,) is the acceleration that the physics adds to its motion.
-    """
-
-    body: int
-    mass: float
-    inertia: Array
-    T_body_inertial: Array
-    gravity: Array
-    fixed: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class JawPads:
-    """The pads of a jaw that grasp whatever element of a rod passes between them.
-
-    ``points`` (p, 3) are the contact points and ``normal`` (3,) points across them, in the inertial frame of the
-    partner ``body``; ``limit`` is the maximum friction force in newtons, shared by the points.
-    """
-
-    body: int
-    points: Array
-    normal: Array
-    limit: float
-
-
-@dataclass(frozen=True, eq=False)
-class PointConstraint:
-    """Holds ``points`` (m, 2, 3), in the inertial frames of ``element`` and of the partner ``body``, together."""
-
-    element: int
-    body: int
-    points: Array
 
 
 class Rod:
@@ -128,7 +87,7 @@ class Rod:
                 raise ValueError(
                     f"rod '{description.name}' is attached to body {attachment.body}, which is missing in its partners"
                 )
-        head, tail, others = _ends(description)
+        head, tail, others = chain_ends(description)
         self._first = 1 if head else 0
         self._own = slice(self._first, self._first + n)
         self._chain = n + self._first + (1 if tail else 0)
@@ -136,9 +95,9 @@ class Rod:
         rest = [partner for partner in partners if partner.body not in ends]
         self.node_of = {**ends, **{p.body: self._chain + k for k, p in enumerate(rest)}}
         self._total = self._chain + len(rest)
-        self.joints = _joints(description, head, tail)
+        self.joints = chain_joints(description, head, tail)
         self._unbent = self.joints.rest.copy()
-        self._nodes = self._new_nodes()
+        self._nodes = chain_nodes(description, self.partners, self.node_of, self._own, self._total, dt)
         self.shapes = shapes or layout.no_shapes(n)
         capacity = 256 + 8 * n + 3 * len(others)
         self._buffers = self._touches = tuple(layout.touches(capacity) for _ in range(3))
@@ -152,7 +111,7 @@ class Rod:
             1.0 / (INDENTATION * float(description.radius.min())), MAX_SPEED, dt,
         )  # fmt: skip
         self._table = table_of(self._arrays)
-        self._permanent = [self._constraint_of(attachment) for attachment in others]
+        self._permanent = [point_constraint(description, attachment) for attachment in others]
         self._mobile = np.full(self._total, -1)
         for partner in partners:
             if partner.mass > 0.0:
@@ -177,36 +136,6 @@ class Rod:
         self.take_passages(passages(1), 0)
         self.impulse, self.tension = self._arrays.impulse, self._arrays.tension
         self.reset()
-
-    # --- building ---------------------------------------------------------------------------
-
-    def _new_nodes(self) -> layout.Nodes:
-        own, description = self._own, self.description
-        nodes = layout.nodes(self._total)
-        nodes.mass[own], nodes.inertia[own] = description.mass, description.inertia
-        nodes.gravity[own], nodes.radius[own] = description.gravity, description.radius
-        nodes.friction[own], nodes.axis[own] = description.friction, description.ends
-        nodes.keep[own] = (1.0 - np.clip(description.damping, 0.0, 1.0)) ** self.dt
-        for partner in self.partners:
-            i = self.node_of[partner.body]
-            nodes.fixed[i] = partner.fixed
-            if not partner.fixed:
-                nodes.mass[i], nodes.inertia[i], nodes.gravity[i] = (
-                    partner.mass,
-                    partner.inertia,
-                    partner.gravity,
-                )
-        return nodes
-
-    def _constraint_of(self, attachment: Attachment) -> PointConstraint:
-        """An attachment in the middle of the rod, as three points that stay together."""
-        arm = 0.5 * float(np.linalg.norm(np.diff(self.description.ends[attachment.element], axis=0)))
-        corners = arm * np.array([[1.0, 0.0, 0.0], [-0.5, 0.866, 0.0], [-0.5, -0.866, 0.0]])
-        return PointConstraint(
-            attachment.element,
-            attachment.body,
-            np.stack([corners @ T[:3, :3].T + T[:3, 3] for T in (attachment.T_element_a, attachment.T_body_b)], axis=1),
-        )
 
     # --- state ------------------------------------------------------------------------------
 
@@ -472,7 +401,8 @@ class Rod:
         partner = next(p for p in self.partners if p.body == body)
         T_b = inverse(partner.T_body_inertial) @ T_body_b
         none = np.zeros(3)
-        self.constraints.append(self._constraint_of(Attachment(element, body, T_a, T_b, none, none, none, none, none)))
+        attachment = Attachment(element, body, T_a, T_b, none, none, none, none, none)
+        self.constraints.append(point_constraint(description, attachment))
         self._near = None
         self._constraint_rows = self._gather_constraints()
 
@@ -494,7 +424,7 @@ class Rod:
         held = (*self._permanent, *self.constraints)
         nodes = [(self._first + g.element, self.node_of[g.body], 0) for g in held]
         nodes += [(self._first, self.node_of[p.body], 1) for p in self._pads for _ in p.points]
-        points = np.array([*(g.points for g in held), *(p for pads in self._pads for p in _grasp_rows(pads))])
+        points = np.array([*(g.points for g in held), *(p for pads in self._pads for p in grasp_rows(pads))])
         self._tick = None
         return np.array(nodes, dtype=np.int64).reshape(-1, 3), points.reshape(-1, 3, 2, 3)
 
@@ -567,67 +497,3 @@ TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "
 
 _KEPT = ("tension", "impulse", "constraints", "_pads", "newton_steps", "settled_soundly")
 """Attributes of a `Rod` that do."""
-
-
-def _grasp_rows(pads: JawPads) -> list[Array]:
-    """Rows (3, 2, 3) of `ligature.suture.point_constraints`, one for each point of a pair of pads."""
-    rows = []
-    for point in pads.points:
-        row = np.zeros((3, 2, 3))
-        row[0, 1], row[1, 1], row[2, 0, 0] = point, pads.normal, pads.limit / len(pads.points)
-        rows.append(row)
-    return rows
-
-
-def _ends(description: RodDescription) -> tuple[Attachment | None, Attachment | None, list[Attachment]]:
-    """The attachments whose bodies become the chain's first and last node, and the others."""
-    head = next((t for t in description.attachments if t.element == 0), None)
-    last = len(description.mass) - 1
-    tail = next(
-        (t for t in description.attachments if t.element == last and (head is None or t.body != head.body)), None
-    )
-    return head, tail, [t for t in description.attachments if t is not head and t is not tail]
-
-
-def _joints(description: RodDescription, head: Attachment | None, tail: Attachment | None) -> layout.Joints:
-    """Joint arrays of the whole chain, those of the attachments at its ends included."""
-    pivots, frames = list(description.pivots), list(description.frames)
-    compliance = list(description.compliance)
-    rows = {
-        "stiffness": list(description.joint_stiffness), "damping": list(description.joint_damping),
-        "rest": list(description.rest), "low": list(description.low), "high": list(description.high),
-    }  # fmt: skip
-    yields = description.yield_moment.tolist()
-    stiffest = float(min(description.compliance))
-    if head is not None:
-        a, b = head.T_body_b, head.T_element_a
-        pivots.insert(0, np.array([a[:3, 3], b[:3, 3]]))
-        frames.insert(0, np.array([a[:3, :3], b[:3, :3]]))
-        compliance.insert(0, stiffest)
-        yields.insert(0, np.inf)
-        seen = {"stiffness": head.stiffness, "damping": head.damping, "rest": -head.rest,
-                "low": -head.high, "high": -head.low}  # fmt: skip
-        for name, values in rows.items():
-            values.insert(0, seen[name])
-    if tail is not None:
-        a, b = tail.T_element_a, tail.T_body_b
-        pivots.append(np.array([a[:3, 3], b[:3, 3]]))
-        frames.append(np.array([a[:3, :3], b[:3, :3]]))
-        compliance.append(stiffest)
-        yields.append(np.inf)
-        for name, values in rows.items():
-            values.append(getattr(tail, name))
-    n = len(pivots)
-    arrays = {name: np.array(values, dtype=float) for name, values in rows.items()}
-    locked = arrays["low"] == arrays["high"]
-    arrays["rest"] = np.where(locked, arrays["low"], arrays["rest"])
-    arrays["stiffness"] = np.where(locked, LOCKED, arrays["stiffness"])
-    weight = description.mass.sum() * 9.81
-    span = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1).sum()
-    bending = np.where(locked, 0.0, arrays["stiffness"]).max(axis=1)
-    return layout.Joints(
-        pivot=np.array(pivots), frame=frame_quaternions(np.array(frames)), compliance=np.array(compliance),
-        **arrays, stop=np.maximum(100.0 * bending, 100.0 * weight * span),
-        yields=np.array(yields),
-        angle=np.zeros((n, 3)), load=np.zeros((n, 6)),
-    )  # fmt: skip

@@ -19,7 +19,8 @@ from ligature.suture.bodies import Bodies, Masses
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, from_chain
 from ligature.suture.exclusions import Exclusions
-from ligature.suture.rod import Partner, Rod
+from ligature.suture.partners import Partner
+from ligature.suture.rod import Rod
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
