@@ -62,6 +62,8 @@ OURS: dict[str, str] = {
     "authoring/lint/files.py:_same_bytes": "compares bytes, by a resolver",
     "authoring/save.py:_staged": "writes",
     "authoring/save.py:_content": "compares bytes with those to be written",
+    "blas.py:_has_avx2": "what Linux says of the processor",
+    "blas.py:loaded": "what Linux says of the process",
     "bus/block.py:Block.__init__": "shared memory of the run",
     "cache.py:write_atomically": "writes",
     "cockpit/assets.py:asset": "files of the page",

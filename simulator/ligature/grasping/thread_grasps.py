@@ -1,7 +1,7 @@
 """Grasps of threads between the fingers of a jaw: rigid across the pads, frictional along them.
 
-Until both pads touch, the rod's own contacts with the fingers act. Then `ligature.suture.partners.JawPads` replace them inside
-the rod's implicit solve; the force between the fingers sets their Coulomb limit. World axes, SI units.
+Until both pads touch, the rod's own contacts with the fingers act. Then `ligature.suture.partners.JawPads` replace
+them inside the rod's implicit solve; the force between the fingers sets their Coulomb limit. World axes, SI units.
 """
 
 from __future__ import annotations

@@ -31,7 +31,9 @@ def chain_nodes(
     nodes.mass[own], nodes.inertia[own] = description.mass, description.inertia
     nodes.gravity[own], nodes.radius[own] = description.gravity, description.radius
     nodes.friction[own], nodes.axis[own] = description.friction, description.ends
-    nodes.keep[own] = (1.0 - np.clip(description.damping, 0.0, 1.0)) ** dt
+    left = 1.0 - np.clip(description.damping, 0.0, 1.0)
+    # Powers of numbers, not of arrays, have the same bits on every processor.
+    nodes.keep[own] = [[share**dt for share in row] for row in left.tolist()]
     for partner in partners:
         i = node_of[partner.body]
         nodes.fixed[i] = partner.fixed
