@@ -63,10 +63,12 @@ CACHES: dict[str, str] = {
     "Holes._site_table": "addresses of arrays",
     "Holes._path_table": "addresses of arrays",
     "Holes._rod_tables": "addresses of arrays",
+    "Holes.search_table": "addresses of arrays",
+    **dict.fromkeys((f"Search.{name}" for name in ("passages", "paths", "sites", "rods")), "addresses of arrays"),
     **dict.fromkeys(
         (
             "Holes._scratch",
-            "Holes._motion",
+            "Search.motion",
             "Holes._reaction",
             "Holes._twist",
             "Holes._pull",

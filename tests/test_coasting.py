@@ -40,14 +40,14 @@ def pair(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Simulation, Sim
         first, second, passed = Simulation(of), Simulation(of), [0, 0]
         coast = first._coasting.pass_ticks
 
-        def counted(ticks: int) -> tuple[int, bool]:
-            found, begun = coast(ticks)
+        def counted(ticks: int, begins: bool = False) -> tuple[int, int]:
+            found, begun = coast(ticks, begins)
             passed[0] += found
-            passed[1] += begun
+            passed[1] += begun > 0
             return found, begun
 
         monkeypatch.setattr(first._coasting, "pass_ticks", counted)
-        monkeypatch.setattr(second._coasting, "pass_ticks", lambda ticks: (0, False))
+        monkeypatch.setattr(second._coasting, "pass_ticks", lambda ticks, begins: (0, 0))
         return first, second, passed
 
     return make
@@ -216,7 +216,7 @@ def test_a_coast_that_fails_is_reported_and_the_run_goes_on(monkeypatch: pytest.
     simulation = Simulation(scene())
     simulation.step(20)
 
-    def broken(ticks: int) -> tuple[int, bool]:
+    def broken(ticks: int, begins: bool) -> tuple[int, int]:
         raise ZeroDivisionError("broken on purpose")
 
     with monkeypatch.context() as patch:

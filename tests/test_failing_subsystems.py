@@ -9,6 +9,7 @@ import ligature
 import numpy as np
 import pytest
 from ligature import Simulation
+from ligature.coasting import Coasting
 from ligature.model.commands import BodyCommand, CommandType, Reset
 from ligature.model.scene import Scene
 from ligature.model.subsystem import Subsystem
@@ -52,9 +53,11 @@ def broken(*_: object) -> None:
 
 
 def step_singly(simulation: Simulation, ticks: int) -> None:
-    """Step by calls of one tick, none of which coasts: every subsystem's own ``step`` is called."""
-    for _ in range(ticks):
-        simulation.step()
+    """Advance by ticks none of which coasts: every subsystem's own ``step`` is called."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Coasting, "begins", False)
+        for _ in range(ticks):
+            simulation.step()
 
 
 def finite(simulation: Simulation) -> bool:

@@ -206,6 +206,7 @@ PARTS = (
     "grasping",
     "arms",
     "sensing",
+    "coasting",
     "bus",
     "ros",
     "teleop",

@@ -14,6 +14,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from numbers import Real
+from operator import methodcaller
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
@@ -42,7 +43,7 @@ from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.handles import BodyHandle, Handles, JointHandle
 from ligature.model.messages import Message, handle
 from ligature.model.scene import Actuator, Body, Camera, Light, Scene
-from ligature.model.state import StateRecord, new_state
+from ligature.model.state import FieldViews, StateRecord, new_state
 from ligature.model.subsystem import Subsystem, copied
 from ligature.physics import Controllers, World, failed, failure
 from ligature.physics.guard import Guard
@@ -58,6 +59,7 @@ from ligature.sensing.targets import Targets
 from ligature.sensing.touches import Touches
 from ligature.soft import BeforeRods, Tissues
 from ligature.suture import Insertion, RodQueries, Suture
+from ligature.suture.searching import SOLVED
 
 Array = NDArray[np.float64]
 
@@ -195,6 +197,7 @@ class Simulation:
             [s for s in self._subsystems if getattr(type(s), name) is not getattr(Subsystem, name)]
             for name in ("write_state", "sense", "take_problems")
         )
+        self._times = FieldViews("tick", "update", "resets", "sim_time")
         self._resting: dict[int, int] = {}
         """Subsystems that are skipped, by their number, and the tick at which each continues."""
         self._reported: dict[tuple[str, str], int] = {}
@@ -203,11 +206,18 @@ class Simulation:
             for phase, subsystems in self._tick.items()
         ]
         self._coasting = Coasting(self._world, self._suture)
-        self._beside_bodies = [
-            s for _, subsystems in self._phases for s in subsystems if not isinstance(s, World | Controllers | Suture)
-        ]
-        self._beside_bodies.sort(key=lambda s: (type(s).idle_ticks is not Subsystem.idle_ticks, s is self.arms))
-        """Whoever steps beside bodies and threads; first those that may never be idle, last the arms."""
+        (control, controlling), (suture, coupled), *left = self._phases
+        leaders, controllers = _parted(controlling, Controllers)
+        followers, threads = _parted(coupled, Suture)
+        self._leading = [(control, leaders)]
+        self._unsolved = [(suture, followers), *left]
+        self._following = [(suture, coupled), *left]
+        self._controlled = [(control, controllers), *self._following]
+        """What is left of a tick after leaders, and controllers, and threads have stepped."""
+        self._begins = coupled[: len(threads)] == threads
+        """Whether threads step next after controllers."""
+        self._before_bodies = _never_idle_first(leaders)
+        self._after_bodies = _never_idle_first(_parted([s for _, group in self._unsolved for s in group], World)[0])
         self.bodies = Handles("body", scene.bodies, [BodyHandle(self, b) for b in scene.bodies])
         self.joints = Handles("joint", scene.joints, [JointHandle(self, j) for j in scene.joints])
         self._handlers: dict[type[Message], Callable[[Any], None]] = {
@@ -244,18 +254,36 @@ class Simulation:
         if ticks < 0:
             raise ValueError(f"ticks is {ticks}; it must be 0 or more")
         while ticks > 0:
-            passed = self._coast(ticks) if ticks > 1 else 0
-            if not passed:
-                self._advance()
-                passed = 1
-            ticks -= passed
+            ticks -= self._advance(ticks)
         self._write_state()
         self._watch()
 
-    def _advance(self) -> None:
-        """One tick: commands become motor targets and forces, threads and grasps exchange impulses, bodies move."""
-        self._step_phases(self._phases)
+    def _advance(self, ticks: int) -> int:
+        """Advance by a tick, or by up to ``ticks`` in which only bodies and threads have work; returns how many.
+
+        In a tick commands become motor targets and forces, threads and grasps exchange impulses, bodies move.
+        """
+        tick, coasting = self._clock.since_reset, self._coasting
+        begins = not self._resting and coasting.begins
+        free = _idle_ticks(self._after_bodies, tick, ticks) if begins and coasting.coasts else 0
+        idle = _idle_ticks(self._before_bodies, tick, min(free + 1, ticks)) if begins and ticks > 1 else 0
+        if not idle:
+            self._step_phases(self._leading)
+            free = min(free, _idle_ticks(self._after_bodies, tick, 1))  # what has stepped may drive a jaw
+        most = min(free, idle or 1)
+        begins = begins and self._begins and most < (idle or 1)
+        passed, begun = self._coast(most, begins) if most or begins else (0, 0)
+        if passed:
+            for subsystem in (*self._after_bodies, *(self._before_bodies if idle else ())):
+                subsystem.pass_idle(passed)
+            self._clock.advance(passed)
+            if not begun:
+                return passed
+        if idle:
+            self._step_phases(self._leading)
+        self._step_phases(self._unsolved if begun == SOLVED else self._following if begun else self._controlled)
         self._clock.advance()
+        return passed + 1
 
     def _step_phases(self, phases: Sequence[tuple[Stopwatch, Sequence[Subsystem]]]) -> None:
         """Step the subsystems of ``phases`` of a tick."""
@@ -271,37 +299,19 @@ class Simulation:
             begin, now = now, clock.perf_counter()
             stopwatch.seconds += now - begin
 
-    def _coast(self, ticks: int) -> int:
-        """Advance by up to ``ticks`` in which only bodies and threads have work, in one call; returns how many."""
-        if self._resting:
-            return 0
-        tick = self._clock.since_reset
-        for subsystem in self._beside_bodies:
-            ticks = min(ticks, subsystem.idle_ticks(tick))
-            if ticks < 2:
-                return 0
+    def _coast(self, ticks: int, begins: bool) -> tuple[int, int]:
+        """Advance by up to ``ticks`` in which only bodies and threads have work, in one call; returns how many.
+
+        Returns also how far another one has begun; see `Coasting.pass_ticks`.
+        """
         try:
-            passed, begun = self._coasting.pass_ticks(ticks)
+            passed, begun = self._coasting.pass_ticks(ticks, begins)
         except Exception as error:  # nothing ends a run but its user
             self._leave_out(self._world, error)
-            passed, begun = 1, False
+            passed, begun = 1, 0
         for phase, seconds in zip(COASTED, self._coasting.spent.tolist(), strict=True):
             self.phases[phase].seconds += seconds
-        if passed:
-            for subsystem in self._beside_bodies:
-                subsystem.pass_idle(passed)
-            self._clock.advance(passed)
-        if begun:
-            self._finish()
-        return passed + begun
-
-    def _finish(self) -> None:
-        """Do what is left of a tick in which controllers have acted and nothing else of their phase has work."""
-        (_, controlling), *left = self._phases
-        for subsystem in controlling:
-            subsystem.pass_idle(1)
-        self._step_phases(left)
-        self._clock.advance()
+        return passed, begun
 
     def _leave_out(self, subsystem: Subsystem, error: Exception) -> None:
         """Reset and skip, for a while, a subsystem whose step raised; then it continues without commands."""
@@ -318,10 +328,10 @@ class Simulation:
             self._guarded(subsystem, "recover")
         return False
 
-    def _guarded(self, subsystem: Subsystem, name: str, *arguments: StateRecord) -> None:
+    def _guarded(self, subsystem: Subsystem, name: str) -> None:
         """Call a method other than `step` of a subsystem; an exception is reported, and the others continue."""
         try:
-            getattr(subsystem, name)(*arguments)
+            getattr(subsystem, name)()
         except Exception as error:
             self._report(subsystem, name, "the simulation continues without it", error)
 
@@ -352,14 +362,21 @@ class Simulation:
     def _write_state(self) -> None:
         """Fill the state record: the state, then the sensors' readings of it. This changes no state."""
         with self.phases["state"]:
-            for subsystem in self._writers:
-                self._guarded(subsystem, "write_state", self.state)
+            self._fill("write_state", self._writers)
             for subsystem in self._reporters:
                 self.problems += subsystem.take_problems()
-            self._clock.write_state(self.state, self.dt, self.ticks_per_update)
+            self._clock.write(self._times.of(self.state), self.dt, self.ticks_per_update)
         with self.phases["sensing"]:
-            for subsystem in self._senses:
-                self._guarded(subsystem, "sense", self.state)
+            self._fill("sense", self._senses)
+
+    def _fill(self, name: str, subsystems: Sequence[Subsystem]) -> None:
+        """Have subsystems write to the record, each by its method ``name``; where one fails the others continue."""
+        write = methodcaller(name, self.state)
+        for subsystem in subsystems:
+            try:  # here and not in `_guarded`: it is done every update
+                write(subsystem)
+            except Exception as error:
+                self._report(subsystem, name, "the simulation continues without it", error)
 
     @property
     def insertions(self) -> tuple[Insertion, ...]:
@@ -540,14 +557,36 @@ class Clock:
         self.since_reset = 0
         self.resets += 1
 
-    def write_state(self, state: StateRecord, dt: float, ticks_per_update: int) -> None:
-        """Write counts and time."""
-        state["tick"], state["resets"], state["sim_time"] = self.tick, self.resets, self.tick * dt
-        state["update"] = self.tick // ticks_per_update
+    def write(self, fields: Sequence[NDArray[Any]], dt: float, ticks_per_update: int) -> None:
+        """Write counts and time to the fields tick, update, resets and sim_time of a record, (1,) each."""
+        tick, update, resets, sim_time = fields
+        tick[0], resets[0], sim_time[0] = self.tick, self.resets, self.tick * dt
+        update[0] = self.tick // ticks_per_update
+
+
+def _parted(subsystems: Sequence[Subsystem], kind: Any) -> tuple[list[Subsystem], list[Subsystem]]:
+    """Subsystems that are not of a kind, and those that are."""
+    return [s for s in subsystems if not isinstance(s, kind)], [s for s in subsystems if isinstance(s, kind)]
+
+
+def _never_idle_first(subsystems: Sequence[Subsystem]) -> list[Subsystem]:
+    """Subsystems in the order in which to ask them; arms take the longest to answer."""
+    return sorted(subsystems, key=lambda s: (type(s).idle_ticks is not Subsystem.idle_ticks, isinstance(s, ArmSet)))
+
+
+def _idle_ticks(subsystems: Sequence[Subsystem], tick: int, most: int) -> int:
+    """For how many ticks from ``tick`` on all ``subsystems`` are idle, at most."""
+    for subsystem in subsystems:
+        most = min(most, subsystem.idle_ticks(tick))
+        if most < 1:
+            return 0
+    return most
 
 
 def _whole(ticks: Any) -> int:
     """``ticks`` as an int: a whole number of any type; raises TypeError for anything else."""
+    if type(ticks) is int:
+        return ticks
     try:
         whole = int(np.asarray(ticks).item() if np.size(ticks) == 1 else ticks)
         if not isinstance(ticks, str) and whole == ticks:

@@ -13,7 +13,7 @@ from ligature.arms.records import ArmRecords
 from ligature.model.lookup import UnknownNameError
 from ligature.model.scene import ArmKind, Scene
 from ligature.model.state import StateRecord
-from ligature.model.subsystem import Subsystem
+from ligature.model.subsystem import ALWAYS, Subsystem
 from ligature.physics import World
 from ligature.robots.arm import Arm
 from ligature.robots.commands import ArmCommand
@@ -110,12 +110,15 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
     def idle_ticks(self, tick: int) -> int:
         """The ticks until following errors are checked, while all arms stay at their set-points.
 
-        A check now that would find nothing is none.
+        A check now that would find nothing is none, and arms without set-points are not checked.
         """
         if not all(arm.is_idle for arm in self._arms):
             return 0
+        watched = [arm for arm in self._arms if arm.is_watched]
+        if not watched:
+            return ALWAYS
         left = WATCH_PERIOD - 1 - tick % WATCH_PERIOD
-        return WATCH_PERIOD if left == 0 and all(arm.is_on_course for arm in self._arms) else left
+        return WATCH_PERIOD if left == 0 and all(arm.is_on_course for arm in watched) else left
 
     def pass_idle(self, ticks: int) -> None:
         """Count the time of all arms."""

@@ -19,13 +19,19 @@ Array = NDArray[np.float64]
 
 
 class BodyCommands:
-    """The commands of the bodies of an engine, and the fingers that are stopped on a thread."""
+    """The commands of the bodies of an engine, and the fingers that are stopped on a thread.
+
+    Attributes
+    ----------
+    drives
+        (bodies,) what `driven` says of each body.
+    """
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
         self._controls: dict[int, BodyControl] = {}
         self._stopped: set[int] = set()
-        self._driven, self._pushable = (np.full(len(engine.scene.bodies), value) for value in (False, True))
+        self.drives, self._pushable = (np.full(len(engine.scene.bodies), value) for value in (False, True))
 
     def take(self, body: int, type_: CommandType, target: Array) -> None:
         """Take a command; it holds until the next one or `clear`."""
@@ -53,7 +59,7 @@ class BodyCommands:
 
     def driven(self, body: int) -> bool:
         """Whether a command sets the velocity of a body, so that a thread, however light the body, does not."""
-        return bool(self._driven[body])
+        return bool(self.drives[body])
 
     def pushable(self, body: int) -> bool:
         """Whether an impulse moves a body: the joint of a stopped finger bears it."""
@@ -63,11 +69,11 @@ class BodyCommands:
         """Note what `driven` and `pushable` say of a body: they are asked in every tick."""
         control, stopped = self._controls.get(body), body in self._stopped
         moved = control is not None and control.sets_velocity
-        self._driven[body], self._pushable[body] = stopped or moved, stopped or not moved
+        self.drives[body], self._pushable[body] = stopped or moved, stopped or not moved
 
     def _sort_all(self) -> None:
         """The same of all bodies."""
-        self._driven[:], self._pushable[:] = False, True
+        self.drives[:], self._pushable[:] = False, True
         for body in {*self._controls, *self._stopped}:
             self._sort(body)
 

@@ -275,14 +275,16 @@ class World(Subsystem):
             self._heal()
 
     @property
-    def coasts(self) -> bool:
-        """Whether nothing but joints, damping, gravity and impulses acts on bodies as long as no command comes.
+    def begins(self) -> bool:
+        """Whether `pre_step` is what compiled code does with `always`."""
+        return bool(self.engine.motions.handle) and not self.commands.all
 
-        Ticks are then what compiled code does with `always`.
-        """
+    @property
+    def coasts(self) -> bool:
+        """Whether `step`, too, does nothing but advance Bullet, as long as no command comes."""
         return not (
-            not self.engine.motions.handle or self.commands.all or self.masses.added or self.collisions.waits
-            or self._parting.watches or self.chunks.bodies or self.scene.closures
+            self.masses.added or self.collisions.waits or self._parting.watches or self.chunks.bodies
+            or self.scene.closures
         )  # fmt: skip
 
     def conclude(self, sound: bool) -> None:

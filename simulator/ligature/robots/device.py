@@ -318,6 +318,11 @@ class Device:
             self.fault(f"joint {self.joints.names[worst]} is {errors[worst]:.3g} away from its set-point")
 
     @property
+    def is_watched(self) -> bool:
+        """Whether `watch` may do something until the next command."""
+        return bool(self._astray) or self._follows()
+
+    @property
     def is_on_course(self) -> bool:
         """Whether `watch` would do nothing now."""
         if self._astray:
@@ -325,9 +330,13 @@ class Device:
         followed = self._followed()
         return followed is None or all(map(operator.le, followed[1], self._following_bounds))
 
+    def _follows(self) -> bool:
+        """Whether joints have a set-point to follow."""
+        return self._state is State.ENABLED and self.joints.mode not in (Mode.OFF, Mode.EFFORT)
+
     def _followed(self) -> tuple[list[float], list[float]] | None:
         """Joint values and following errors, None where there is no set-point to follow."""
-        if self._state is not State.ENABLED or self.joints.mode in (Mode.OFF, Mode.EFFORT):
+        if not self._follows():
             return None
         q = self.joints.measured()[0].tolist()  # numbers: arrays of six take longer
         return q, [abs(now - wanted) for now, wanted in zip(q, self.joints.setpoint[0].tolist(), strict=True)]

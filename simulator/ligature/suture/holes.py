@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 from ligature.model.frames import inverse
 from ligature.model.piercing import Hole, Tissue
 from ligature.model.scene import Scene
-from ligature.model.state import MAX_INSERTIONS, StateRecord
-from ligature.model.subsystem import ALWAYS, kept, put_back
+from ligature.model.state import MAX_INSERTIONS, FieldViews, StateRecord
+from ligature.model.subsystem import kept, put_back
 from ligature.suture import passages as arrays
 from ligature.suture.bodies import HeldBodies
 from ligature.suture.passage_forces import react, solve_needle
 from ligature.suture.rod import Rod
 from ligature.suture.rods import Rods
-from ligature.suture.tracking import follow_needle, follow_rod, look_for_needles, look_for_rod, next_search
+from ligature.suture.searching import Search, search
+from ligature.suture.tracking import follow_needle, follow_rod
 from ligature.tables import table_of
 
 Array = NDArray[np.float64]
@@ -42,15 +43,6 @@ FRICTION_PER_WEIGHT, STRENGTH_PER_WEIGHT, SAG = 2.5, 15.0, 2e-5
 
 SETTLING = 0.002
 """Time constant in seconds in which a needle returns to its puncture."""
-
-NEAR = 0.01
-"""Distance in metres within which a hole's pose is read at every search."""
-
-MAX_APPROACH = 0.5
-"""Maximum speed in m/s of needles and threads between two searches."""
-
-MAX_WAIT = 32
-"""Most ticks between two searches for passages."""
 
 _KEPT = ("_countdown", "_turn", "_near", "_gaps")
 """Attributes of `Holes` that last from tick to tick: when to search for new passages, and where."""
@@ -89,7 +81,7 @@ class Holes:
     """
 
     def __init__(self, scene: Scene, rods: Rods, bodies: HeldBodies, dt: float) -> None:
-        self._scene, self._rods, self._bodies, self._dt = scene, rods.rods, bodies, dt
+        self._scene, self._rods, self._bodies = scene, rods.rods, bodies
         self._needles = [needle.body for needle in scene.needles]
         self._passages = arrays.passages()
         self._sites = _sites(scene, bodies)
@@ -104,17 +96,35 @@ class Holes:
         self._scratch = (np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(6))
         self._reaction = np.zeros(6)
         n = len(self._needles)
-        self._watched = np.array([*self._needles, *(hole.body for hole in scene.holes)], dtype=np.int64)
-        self._motion = np.zeros((len(self._watched), 13))
         self._twist, self._pull = np.zeros((n, 6)), np.zeros((n, 6))
         self._mass, self._inertia = np.zeros(n), np.zeros((n, 3))
-        self._gaps = np.zeros((n + len(self._rods), len(scene.holes)))
-        self._near = np.ones(len(scene.holes), dtype=bool)
         self._mobile = self._sites.recoil.any(axis=(1, 2))
-        self._countdown = 0
-        self._turn = -1
+        self._search = self._search_of(dt)
+        self._countdown, self._turn, self._near, self._gaps = self._search[:4]
         self.idle = not scene.holes or not (self._needles or self._rods)
         """Whether nothing can ever be in a hole."""
+        self.search_table = np.zeros(0, np.int64) if self.idle else table_of(self._search)
+        """The table of a `Search`, empty where nothing can ever be in a hole."""
+        self._fields = FieldViews("insertion_count")
+        self._looked = False
+        """Whether compiled code did in this tick what `begin` does until passages are followed."""
+
+    def _search_of(self, dt: float) -> Search:
+        """What `search` takes; at first it looks at once, at all holes."""
+        rods, holes, lengths = self._rods, self._scene.holes, self._before
+        before = np.zeros((len(rods), max(map(len, lengths), default=1)))
+        for row, length in zip(before, lengths, strict=True):
+            row[: len(length)] = length
+        watched = [*self._needles, *(hole.body for hole in holes)]
+        return Search(
+            countdown=np.zeros(1, np.int64), turn=np.full(1, -1), near=np.ones(len(holes), dtype=bool),
+            gaps=np.zeros((len(self._needles) + len(rods), len(holes))), watched=np.array(watched, dtype=np.int64),
+            motion=np.zeros((len(watched), 13)), passages=self._passage_table, paths=self._path_table,
+            sites=self._site_table, rods=np.array(self._rod_tables or np.zeros((0, 1)), dtype=np.int64),
+            first=np.array([rod.first for rod in rods], dtype=np.int64),
+            elements=np.array([len(length) - 1 for length in lengths], dtype=np.int64), before=before,
+            dt=np.array([dt]),
+        )  # fmt: skip
 
     # --- the tick ---------------------------------------------------------------------------
 
@@ -122,26 +132,24 @@ class Holes:
         """Find and follow passages, before the rods advance."""
         if self.idle:
             return
-        if self._countdown > 0:
-            self._countdown -= 1
-            if not self._passages.filled[0]:
-                return
+        if self._looked:
+            self._looked = False
+        elif self._countdown[0] > 0:
+            self._countdown[0] -= 1
         else:
-            self._search()
+            self._bodies.read_motions(self._search.watched, self._search.motion)
+            search(self.search_table)
         if self._passages.filled[0]:
             self._follow()
 
     @property
-    def waits(self) -> int:
-        """For how many ticks `begin` only counts them, and `end` does nothing."""
-        if self.idle:
-            return ALWAYS
-        return 0 if self._passages.filled[0] else self._countdown
+    def empty(self) -> bool:
+        """Whether `begin` only searches now, and `end` does nothing."""
+        return not self._passages.filled[0]
 
-    def wait(self, ticks: int) -> None:
-        """Count ``ticks`` in which nothing else was to be done."""
-        if not self.idle:
-            self._countdown -= ticks
+    def look_ahead(self) -> None:
+        """Compiled code has searched, or counted a tick, for the coming `begin`."""
+        self._looked = True
 
     def end(self) -> None:
         """Solve needles without a rod and apply the reactions to the holes, after the rods have advanced."""
@@ -157,20 +165,6 @@ class Holes:
             react(self._passage_table, self._sites.pose, c, self._reaction)
             if self._mobile[p.hole[c]]:
                 self._bodies.apply_impulse(hole.body, self._reaction[:3], self._reaction[3:])
-
-    def _search(self) -> None:
-        """Find paths that have entered holes, and the number of ticks in which no other can."""
-        self._turn = (self._turn + 1) % len(self._scene.holes)
-        self._near[self._turn] = True
-        self._bodies.read_motions(self._watched, self._motion)
-        tables, n = (self._passage_table, self._path_table, self._site_table), len(self._needles)
-        look_for_needles(*tables, n, self._motion, self._near, self._gaps)
-        for owner, rod in enumerate(self._rods):
-            look_for_rod(
-                self._passage_table, self._site_table, self._rod_tables[owner], rod.first, self._before[owner],
-                n + owner, owner, self._gaps[n + owner],
-            )  # fmt: skip
-        self._countdown = next_search(self._gaps, self._near, NEAR, MAX_APPROACH * self._dt, MAX_WAIT)
 
     def _read_holes(self, holes: list[int]) -> None:
         sites = self._sites
@@ -228,7 +222,7 @@ class Holes:
     def _solve_needle(self, path: int) -> None:
         solve_needle(
             self._passage_table, path, self._paths.pose[path], self._twist[path], self._mass[path], self._inertia[path],
-            self._pull[path], *self._scratch, self._dt,
+            self._pull[path], *self._scratch, self._search.dt[0],
         )  # fmt: skip
         p, n = self._passages, int(self._passages.filled[0])
         impulse = p.impulse[:n][p.path[:n] == path].sum(axis=0)
@@ -254,10 +248,11 @@ class Holes:
 
     def write_state(self, state: StateRecord) -> None:
         """Write the insertions into a state record."""
-        found = self.insertions[:MAX_INSERTIONS]
-        if not found and not state["insertion_count"][0]:
+        (count,) = self._fields.of(state)
+        if not self._passages.filled[0] and not count[0]:
             return
-        state["insertion_count"] = len(found)
+        found = self.insertions[:MAX_INSERTIONS]
+        count[0] = len(found)
         for name in ("hole", "body", "depth", "point", "force"):
             state[f"insertion_{name}"] = 0
         for row, insertion in enumerate(found):
@@ -270,12 +265,12 @@ class Holes:
         if body in self._needles:
             path = self._needles.index(body)
             self._keep([c for c in range(n) if p.path[c] != path and p.owner[c] != self._paths.owner[path]])
-        self._countdown = 0
+        self._countdown[0] = 0
 
     def reset(self) -> None:
         """Empty all holes, and search for new passages in the next tick."""
         self._clear()
-        self._countdown, self._turn = 0, -1
+        self._countdown[0], self._turn[0], self._looked = 0, -1, False
         self._near[:] = True
         self._gaps[:] = 0.0
         self._read_holes(list(range(len(self._scene.holes))))
@@ -295,6 +290,7 @@ class Holes:
             getattr(self._passages, name)[:n] = snapshot["rows"][name]
         self._sites.pose[:], self._sites.twist[:] = snapshot["pose"], snapshot["twist"]
         put_back(self, {name: snapshot[name] for name in _KEPT})
+        self._looked = False
 
     def _clear(self) -> None:
         """Clear the passages, and the rows of earlier ones."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ligature.adf import Diagnostic, Severity
 from ligature.adf.diagnostics import length
 from ligature.model.scene import Scene
-from ligature.model.state import StateRecord
+from ligature.model.state import FieldViews, StateRecord
 from ligature.suture.bodies import Bodies, Masses
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import RodDescription, from_chain
@@ -60,6 +60,7 @@ class Rods:
         self._places = {
             body: (number, e) for number, rod in enumerate(self.rods) for e, body in enumerate(rod.description.bodies)
         }
+        self._fields = FieldViews("body_pose", "body_twist", "rod_tension")
         self._tick_tables: list[Integers] = []
         self._ticks = np.zeros((0, 0), np.int64)
 
@@ -206,8 +207,9 @@ class Rods:
 
     def write_state(self, state: StateRecord) -> None:
         """Write poses, twists and tension of the elements of every rod into a state record."""
+        fields = self._fields.of(state)
         for rod in self.rods:
-            rod.write(state["body_pose"][0], state["body_twist"][0], state["rod_tension"][0])
+            rod.write(*fields)
 
     def is_attached(self, body: int, element_body: int) -> bool:
         """Whether `attach` holds the element ``element_body`` to ``body``."""

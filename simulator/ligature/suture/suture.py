@@ -11,6 +11,7 @@ from ligature.model.subsystem import ALWAYS, Subsystem
 from ligature.suture.bodies import SutureBodies
 from ligature.suture.holes import Holes
 from ligature.suture.rods import Rods
+from ligature.suture.searching import LOOKED, SOLVED
 
 
 class Suture(Subsystem):
@@ -44,18 +45,22 @@ class Suture(Subsystem):
         """Always where nothing can ever be done, else none."""
         return ALWAYS if self._idle else 0
 
-    def coasting_ticks(self) -> int:
-        """For how many ticks `step` is what compiled code does with `Rods.tick_tables`, if no command comes."""
-        if self._idle:
-            return ALWAYS
-        return self.holes.waits if self.rods.coasts else 0
+    @property
+    def coasts(self) -> bool:
+        """Whether `step` is what compiled code does with `Rods.tick_tables` and `Holes.search_table`.
 
-    def conclude(self, ticks: int, begun: bool) -> None:
-        """Take over ``ticks`` of compiled code; whether another one has ``begun``, in which other bodies are near."""
-        self.holes.wait(ticks)
-        if ticks:
+        It is until a command comes, something enters a hole or other bodies are near a rod.
+        """
+        return self._idle or (self.holes.empty and self.rods.coasts)
+
+    def conclude(self, ticks: int, begun: int) -> None:
+        """Take over ``ticks`` of compiled code, and how far another one has ``begun``: 0, `SEARCHED` and so on."""
+        solved = begun == SOLVED
+        if ticks or solved:
             self.rods.conclude()
-        if begun:
+        if begun and not solved:
+            self.holes.look_ahead()
+        if begun == LOOKED:
             self.rods.colliders.look_ahead()
 
     def write_state(self, state: StateRecord) -> None:

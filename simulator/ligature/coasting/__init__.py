@@ -1,0 +1,82 @@
+"""Advances bodies and threads over several ticks in one compiled call: nothing else has work in them.
+
+Calls of Python within a tick cost more than what they compute, for Bullet and the threads evict Python from the caches.
+Every other subsystem has stated that it is idle; see `ligature.model.subsystem.Subsystem.idle_ticks`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ligature.coasting.clock import clock
+from ligature.physics import World
+from ligature.physics.divergence import MAX_SPEED
+from ligature.suture import Suture
+
+PHASES = ("control", "suture", "bodies")
+"""Phases of a tick that are timed here, in order."""
+
+
+class Coasting:
+    """Coasts through ticks of one simulation.
+
+    Attributes
+    ----------
+    spent
+        (3,) seconds of the last call, by `PHASES`.
+    """
+
+    def __init__(self, world: World, suture: Suture) -> None:
+        self._world, self._suture, self._dt = world, suture, world.dt
+        self.spent, self._corners, self._clock = np.zeros(len(PHASES)), np.zeros((2, 3)), clock()
+        self._kernel = _kernel(threads=bool(suture.rods.rods))
+        self._coast(0)  # loads the kernel, which a run would stand still for
+
+    @property
+    def begins(self) -> bool:
+        """Whether controllers and threads have no work in the coming tick but what compiled code does."""
+        return self._world.begins and self._suture.coasts
+
+    @property
+    def coasts(self) -> bool:
+        """Whether bodies have none either; `begins` is true."""
+        return self._world.coasts
+
+    def pass_ticks(self, ticks: int, begins: bool = False) -> tuple[int, int]:
+        """Advance by up to ``ticks``, with the same bits as single ticks; returns how many passed.
+
+        Returns also how far another one has begun, whose controllers have acted: 0 is not at all; after `SOLVED`
+        grasps and bodies are to follow, else threads, too. Where it ``begins`` on purpose, that is so as a rule.
+        """
+        self.spent[:] = 0.0
+        if not self.begins:
+            return 0, 0
+        passed, begun, sound = self._coast(ticks if self.coasts else 0, begins)
+        self._suture.conclude(passed, begun)
+        self._world.conclude(sound)
+        return passed, begun
+
+    def _coast(self, ticks: int, begins: bool = False) -> tuple[int, int, bool]:
+        world, rods = self._world, self._suture.rods
+        threads = (
+            world.impulses.total, world.commands.drives, rods.colliders.table, rods.colliders.indices,
+            rods.tick_tables(), self._corners,
+        ) if rods.rods else ()  # fmt: skip
+        found: tuple[int, int, bool] = self._kernel(
+            *world.always, world.impulses.acted, self._suture.holes.search_table, self._clock, self.spent, self._dt,
+            MAX_SPEED, ticks, int(begins), *threads,
+        )  # fmt: skip
+        return found
+
+
+def _kernel(threads: bool) -> Callable[..., tuple[int, int, bool]]:
+    """The compiled ticks of a scene with ``threads``, or without: it loads nothing of threads then."""
+    if threads:
+        from ligature.coasting.threads import coast
+
+        return coast
+    from ligature.coasting import bodies
+
+    return bodies.coast

@@ -1,0 +1,109 @@
+"""Ticks of a scene with threads, as compiled code."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ligature.coasting.clock import now
+from ligature.coasting.passages import find_passages
+from ligature.kernels import inlined, kernel
+from ligature.physics.preparing import prepare
+from ligature.physics.trees import load_body, read_bodies, step_world
+from ligature.suture.colliders import LOOKS, NEAR
+from ligature.suture.placing import look, open_watch
+from ligature.suture.searching import LOOKED, SEARCHED, SOLVED
+from ligature.suture.substeps import open_rod
+from ligature.suture.ticking import RodTick, open_rod_tick, pass_tick, surround
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+@kernel
+def coast(
+    handle: int, tree_table: Integers, axis_table: Integers, place_table: Integers, slowed: Integers, factors: Array,
+    lifted: Integers, forces: Array, acted: Flags, search: Integers, clock: Integers, spent: Array, dt: float,
+    limit: float, ticks: int, begins: int, total: Array, driven: Flags, watch_table: Integers, watched: Integers,
+    rods: Integers, corners: Array,
+) -> tuple[int, int, bool]:  # fmt: skip
+    """Advance by up to ``ticks``, and where ``begins`` is 1 begin another one, up to the step of the bodies.
+
+    It ends after one in which anything is not finite or has a speed not below ``limit``, and within one in which
+    something has entered a hole, or other bodies are near the ``rods`` than before.
+
+    The first arguments are those of `prepare`; ``total`` and ``acted`` are those of `Impulses`, ``search`` the table of
+    a `Search`, ``driven`` (bodies,) those that a command moves; ``spent`` (3,) adds up seconds by phase. Returns how
+    many ticks passed; how far another one has begun, as `Suture.conclude` takes it; and whether all trees of bodies
+    are finite and slow enough.
+    """
+    begin = now(clock)
+    for passed in range(ticks + begins):
+        for body in range(acted.shape[0]):
+            acted[body] = False
+        prepare(handle, tree_table, axis_table, place_table, slowed, factors, lifted, forces, dt)
+        prepared = now(clock)
+        spent[0] += prepared - begin
+        if find_passages(handle, tree_table, place_table, search):
+            return passed, SEARCHED, True
+        if _look_around(handle, tree_table, place_table, watch_table, watched, rods, corners, dt):
+            return passed, LOOKED, True
+        whole = _pass_rods(handle, tree_table, place_table, rods, total, acted, driven, dt)
+        moved = now(clock)
+        spent[1] += moved - prepared
+        if passed == ticks:
+            return passed, SOLVED, True
+        sound = step_world(handle, tree_table, limit)
+        begin = now(clock)
+        spent[2] += begin - moved
+        if not (sound and whole):
+            return passed + 1, 0, sound
+    return ticks, 0, True
+
+
+@inlined
+def _look_around(
+    handle: int, tree_table: Integers, place_table: Integers, watch_table: Integers, watched: Integers, rods: Integers,
+    corners: Array, dt: float,
+) -> bool:  # fmt: skip
+    """Bring the bodies near the rods up to date; whether they are others than before."""
+    if watched.shape[0] == 0:
+        return False
+    surround(rods, corners)
+    read_bodies(handle, tree_table, place_table, watched, open_watch(watch_table).seen)
+    return look(watch_table, corners, dt, LOOKS, NEAR)
+
+
+@inlined
+def _pass_rods(
+    handle: int, tree_table: Integers, place_table: Integers, rods: Integers, total: Array, acted: Flags,
+    driven: Flags, dt: float,
+) -> bool:  # fmt: skip
+    """A tick of all rods, and their impulses on bodies; whether the rods are finite and slow enough."""
+    whole = True
+    for r in range(rods.shape[0]):
+        tick = open_rod_tick(rods[r])
+        _hold_driven(tick, driven)
+        pass_tick(tick)
+        rod = open_rod(tick.rod)
+        for m in range(rod.counts[4]):
+            node = rod.pushed[m]
+            body = tick.body[node]
+            if body < 0:
+                continue
+            for a in range(6):
+                total[body, a] = total[body, a] + rod.impulse[node, a] if acted[body] else rod.impulse[node, a]
+            acted[body] = True
+            load_body(handle, tree_table, place_table, body, rod.impulse[node, :3], rod.impulse[node, 3:], dt)
+        whole = whole and rod.counts[5] == 1
+    return whole
+
+
+@inlined
+def _hold_driven(tick: RodTick, driven: Flags) -> None:
+    """Note which of the bodies around a rod are ``driven`` now: no thread moves them."""
+    nodes = open_rod(tick.rod).nodes
+    for i in range(tick.body.shape[0]):
+        if tick.body[i] >= 0 and nodes.met[i]:
+            nodes.fixed[i] = driven[tick.body[i]]
