@@ -32,11 +32,12 @@ Array = NDArray[np.float64]
 MAX_LINEARISATIONS, MAX_SOLVES = 8, 150
 """Most times that the geometry is linearised in a careful step, and most solves in all."""
 
-BALANCED = 1e-3
+BALANCED = 1e-4
 """Error of a contact force, as a share of the largest, up to which the energy counts as least."""
 
-UNCHANGED = 0.02
-"""Error of a friction limit, as a share of the largest, up to which Coulomb's law counts as met."""
+UNCHANGED, UNFELT = 0.02, 5e-4
+"""Error of a friction limit, as a share of its own, up to which Coulomb's law counts as met; and as one of the largest,
+which counts for nothing."""
 
 RELAXATION = 0.5
 """Share of the way to the friction limits that a minimum asks for, by which the next one's go."""
@@ -212,8 +213,8 @@ def settle_limits(touches: Touches, work: Work, stiffness: float) -> bool:
         room, _x, _y, _z = _slip(touches, c, u[0], u[1], u[2])
         touches.press[c] = max(-stiffness * room, 0.0)
         limit = touches.friction[c] * touches.press[c]
-        error, largest = max(error, abs(limit - work.limit[c])), max(largest, limit)
-    if error <= UNCHANGED * largest:
+        error, largest = max(error, abs(limit - work.limit[c]) - UNCHANGED * limit), max(largest, limit)
+    if error <= UNFELT * largest:
         return True
     for c in range(touches.count[0]):
         if not touches.bilateral[c]:
