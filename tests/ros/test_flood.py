@@ -28,7 +28,8 @@ from tests.waiting import until
 
 pytestmark = pytest.mark.ros
 FLOAT = (0.0, -0.0, 5e-324, 1e-5, 1.0, -1.0, 0.3, 1e3, -1e6, 1e12, 1.7e308, float("inf"), float("-inf"), float("nan"))
-WORDS = ("", "enable", "disable", "home", "unhome", "pause", "resume", "adopt", "\0", "é" * 90, "x" * 5000)
+NAMES = ("", "map", "/PSM1_base", "jaw", "yaw", "ünïcødé 🪡", "a/../b", "\0")
+WORDS = (*NAMES, "enable", "disable", "home", "unhome", "pause", "resume", "adopt", "\0", "é" * 90, "x" * 5000)
 LENGTHS = (0, 1, 3, 4, 6, 7, 8, 40, 500)
 SHORT, FLOOD = 800, 75_000
 """Messages of the short form, and of the long one over both scenes."""
@@ -55,6 +56,8 @@ def _value(default: Any, type_: str, rng: random.Random, long: bool) -> Any:
         return bytes(count) if base in ("uint8", "char") else [_value(0, base, rng, False) for _ in range(count)]
     if hasattr(default, "_slot_types"):
         return filled(type(default), rng, long)
+    if base in ("time", "duration"):
+        return type(default)(*rng.choice(((0, 0), (1, 0), (2**31 - 1, 999_999_999))))
     if base.startswith("float"):
         return rng.choice(FLOAT[:-4]) if base == "float32" else rng.choice(FLOAT)
     if base == "string":

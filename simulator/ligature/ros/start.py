@@ -10,6 +10,7 @@ import rospy
 import rospy.impl.tcpros_base as tcpros
 from rosgraph.xmlrpc import ThreadingXMLRPCServer
 
+from ligature.ros.connections import give_up_publishers
 from ligature.ros.handshakes import apart
 from ligature.ros.intake import bound_messages
 from ligature.ros.registrations import claim
@@ -27,6 +28,7 @@ def start_node(name: str, several: bool = False) -> None:
     removed = "" if several else claim(f"/{name}")
     ThreadingXMLRPCServer.request_queue_size = WAITING
     bound_messages()
+    give_up_publishers()
     rospy.init_node(name, anonymous=several, disable_signals=True)
     if removed:
         rospy.logwarn(removed)
