@@ -44,12 +44,16 @@ STIFFEST, MOST_DAMPED = 16.0, 0.8
 
 @dataclass
 class _Plan:
-    """Columns of pybullet.createMultiBody, one entry a link; the link of each body, and the axis of each link."""
+    """Columns of pybullet.createMultiBody, one entry a link; the link of each body, and the axis of each link.
+
+    ``start`` has the position of every degree of freedom as the scene starts.
+    """
 
     dt: float
     link_of: dict[int, int]
     T_link_inertial: dict[int, Array]
     axes: list[tuple[int, int, Axis, float]] = field(default_factory=list)
+    start: list[float] = field(default_factory=list)
     masses: list[float] = field(default_factory=list)
     inertias: list[Array] = field(default_factory=list)
     shapes: list[int] = field(default_factory=list)
@@ -172,7 +176,6 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
     bodies, joints = _shared_out(scene), scene.joints
     root = bodies[articulation.links[0].body]
     plan = _Plan(dt, {root.index: -1}, {root.index: np.eye(4)})
-    start: list[float] = []
     for link in articulation.links[1:]:
         assert link.joint is not None
         outer = bodies[link.body]
@@ -181,13 +184,34 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         shape = shapes.create(client, cache, outer.colliders, T_link_body, True, outer.collision_margin)
         plan.link_of[outer.index] = plan.append(outer, bodies[chain.inner], chain, shape)
         plan.T_link_inertial[outer.index] = inverse(chain.T_outer)
-        start += _positions(scene, chain)
+        plan.start += _positions(scene, chain)
+    ends = _append_ends(scene, bodies, plan)
+    uid, stand = _create(client, cache, scene, root, plan)
+    tree = Tree(
+        uid, stand, root.index, plan.link_of, plan.axes, root.static, plan.frames(), plan.start, ends,
+        [root.mass, *plan.masses], [inertia_of(root), *plan.inertias],
+    )  # fmt: skip
+    _set_dynamics(client, tree, plan, bodies)
+    tree.put_joints(client)
+    return tree
+
+
+def _append_ends(scene: Scene, bodies: list[Body], plan: _Plan) -> dict[int, int]:
+    """Append a link for each closing joint that starts from this tree and needs one; the links by joint."""
     ends = {}
     for closure in scene.closures:
         if closure.inner in plan.link_of and needs_link(scene, closure):
             end, chain = _end(scene, bodies, closure)
             ends[closure.joint] = plan.append(end, bodies[chain.inner], chain, shapes.NO_SHAPE)
-            start += [0.0] * len(closure.free) + _positions(scene, chain)
+            plan.start += [0.0] * len(closure.free) + _positions(scene, chain)
+    return ends
+
+
+def _create(client: int, cache: CollisionCache, scene: Scene, root: Body, plan: _Plan) -> tuple[int, int]:
+    """Create the multibody of a plan: its id, and that under which the shapes of its ``root`` stand.
+
+    The shapes of a static root with links are a static body of their own.
+    """
     T_world_inertial = scene.start.roots[root.index] @ root.T_body_inertial
     at = {
         "basePosition": T_world_inertial[:3, 3].tolist(),
@@ -217,22 +241,7 @@ def build(client: int, cache: CollisionCache, scene: Scene, articulation: Articu
         flags=pybullet.URDF_USE_SELF_COLLISION | pybullet.URDF_MAINTAIN_LINK_ORDER,
         **at,
     )
-    tree = Tree(
-        uid,
-        uid if stand is None else stand,
-        root.index,
-        plan.link_of,
-        plan.axes,
-        root.static,
-        plan.frames(),
-        start,
-        ends,
-        [root.mass, *plan.masses],
-        [inertia_of(root), *plan.inertias],
-    )
-    _set_dynamics(client, tree, plan, bodies)
-    tree.put_joints(client)
-    return tree
+    return uid, uid if stand is None else stand
 
 
 def _positions(scene: Scene, chain: Chain) -> list[float]:

@@ -149,12 +149,7 @@ def from_material(
         raise ValueError(f"rod '{name}' needs at least three points, no two neighbours alike")
     n, radius = len(lengths), 0.5 * diameter
     area, moment = np.pi * radius**2, np.pi * radius**4 / 4.0
-    T = np.tile(np.eye(4), (n, 1, 1))
-    R = minimal_rotation(np.array([0.0, 0.0, 1.0]), edges[0] / lengths[0])
-    for i in range(n):
-        if i > 0:
-            R = minimal_rotation(edges[i - 1] / lengths[i - 1], edges[i] / lengths[i]) @ R
-        T[i, :3, :3], T[i, :3, 3] = R, 0.5 * (p[i] + p[i + 1])
+    T = _elements_between(p)
     mass = density * area * lengths
     across = mass * (lengths**2 / 12.0 + radius**2 / 4.0)
     half = np.stack([np.zeros(n), np.zeros(n), 0.5 * lengths], axis=1)
@@ -188,6 +183,19 @@ def from_material(
         yield_moment=bend * yield_angle(yield_strain, radius, between),
         attachments=tuple(attachments),
     )
+
+
+def _elements_between(points: Array) -> Array:
+    """Poses (n, 4, 4) of elements between ``points`` (n + 1, 3): z along each, without twist from one to the next."""
+    edges = np.diff(points, axis=0)
+    along = edges / np.linalg.norm(edges, axis=1)[:, None]
+    T = np.tile(np.eye(4), (len(edges), 1, 1))
+    R = minimal_rotation(np.array([0.0, 0.0, 1.0]), along[0])
+    for i in range(len(edges)):
+        if i > 0:
+            R = minimal_rotation(along[i - 1], along[i]) @ R
+        T[i, :3, :3], T[i, :3, 3] = R, 0.5 * (points[i] + points[i + 1])
+    return T
 
 
 def yield_angle(strain: float, radius: float, length: Array) -> Array:
