@@ -174,7 +174,9 @@ CACHES: dict[str, str] = {
     ),  # fmt: skip
     **dict.fromkeys(("Axes.motor", "Axes.limit"), "written by every tick before it is used"),
     **dict.fromkeys(("Trees.answer", "Trees.wanted_at"), "addresses of arrays"),
-    "Trees.sleepers": "addresses in Bullet's memory",
+    **dict.fromkeys(("Trees.sleepers", "Boxes.phase", "Boxes.at", "Boxes.owner", "Boxes.last"), "in Bullet's memory"),
+    "Boxes.moved": "a restore compares all boxes; every tick writes it",
+    **dict.fromkeys(("Boxes.parked", "Boxes.out"), "scratch"),
     "Trees.before": "scratch",
     "Trees.quiet": "a restore rouses all trees; the next tick decides anew",
     **dict.fromkeys(("Trees.still", "Trees.asleep"), "decided anew by every tick, for trees that are quiet"),

@@ -127,6 +127,16 @@ def whole_at(typing_context: Any, address: Any) -> Any:
 
 
 @intrinsic  # type: ignore[misc]
+def word_at(typing_context: Any, address: Any) -> Any:
+    """The whole number of 64 bits at an address."""
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.load(builder.inttoptr(arguments[0], ir.PointerType(ir.IntType(64))))
+
+    return types.int64(types.intp), build
+
+
+@intrinsic  # type: ignore[misc]
 def put_word(typing_context: Any, address: Any, value: Any) -> Any:
     """Put the word of 64 bits ``value`` at an address."""
 
@@ -199,6 +209,12 @@ _BOX = np.dtype(
 """A box of Bullet, `btSimpleBroadphaseProxy`; the k-th has the number k + 2."""
 
 
+LAST_BOX, FIRST_BOX, PAIRS, BOX_BYTES = 16, 24, 48, 96
+"""Where in the broad phase the place of the last box, the address of the first and that of all pairs are, in bytes."""
+
+PAIR_COUNT, FIRST_PAIR, PAIR_BYTES = 12, 24, 32
+"""Where among pairs their number and the address of the first are; a pair begins with the addresses of its boxes."""
+
 _COLLIDER_BOX, _COLLIDER_FLAGS, _COLLIDER_STATE = 376, 408, 424
 """Where in what owns a box, a `btMultiBodyLinkCollider`, address of the box, flags and state of sleep are."""
 
@@ -260,6 +276,24 @@ def find_sleepers(boxes: int) -> Integers:
             return none
     stands = [bool((_word(owner + _COLLIDER_FLAGS) or 0) & _STANDS) for owner in found["owner"].tolist()]
     return np.where(stands, 0, found["owner"] + _COLLIDER_STATE)
+
+
+def find_owners(boxes: int) -> tuple[Integers, Integers]:
+    """Addresses (n,) of all boxes of a broad phase, in order, and of their owners; 0 for those that have none.
+
+    There are none where this version of PyBullet keeps its pairs elsewhere.
+    """
+    none = np.zeros(0, dtype=np.int64)
+    pairs = _word(boxes + PAIRS) if boxes else None
+    if not pairs or (count := _word(pairs + PAIR_COUNT - 4)) is None or (room := _word(pairs + 16)) is None:
+        return none, none
+    count, room = count >> 32, room & 0xFFFFFFFF
+    if count > room or (count and _word((_word(pairs + FIRST_PAIR) or 0) + PAIR_BYTES * count - 8) is None):
+        return none, none
+    found = _boxes(boxes)
+    at = found.ctypes.data + BOX_BYTES * np.arange(len(found))
+    known = [_word(_word(pairs + FIRST_PAIR) + PAIR_BYTES * j + 8 * side) for j in range(count) for side in range(2)]  # type: ignore[operator]
+    return (at, found["owner"].copy()) if set(known) <= set(at.tolist()) else (none, none)
 
 
 @inlined

@@ -18,8 +18,9 @@ from ligature.model.frames import matrix_pose7
 from ligature.model.scene import Scene
 from ligature.physics.articulation import Tree, build
 from ligature.physics.bodies import Placement
-from ligature.physics.bullet import connect, exclude_void, find_boxes, find_sleepers
+from ligature.physics.bullet import connect, exclude_void, find_boxes, find_owners, find_sleepers
 from ligature.physics.motions import Motions
+from ligature.physics.parking import Boxes, boxes
 from ligature.physics.trees import Places
 from ligature.tables import table_of
 
@@ -111,7 +112,8 @@ class Engine:
         self.trees = [build(self.client, self.cache, scene, a, dt=self.dt) for a in scene.articulations]
         self._colliders = [collider for tree in self.trees for collider in _colliders(self.client, tree)]
         self._boxes = find_boxes(handle) if self.forgets else 0
-        self.motions = Motions(self.client, handle, self.trees, self._sleepers())
+        sleepers = self._sleepers()
+        self.motions = Motions(self.client, handle, self.trees, sleepers, self._compared(any(sleepers)))
         self.place_of = {
             body: Placement(self.client, tree, scene.bodies[body], self.motions, k)
             for k, tree in enumerate(self.trees)
@@ -126,6 +128,7 @@ class Engine:
         self.chunks: dict[int, list[tuple[int, int, int, int]]] = {}
         self.start = self.snapshot()
         self.restore(self.start)  # as every later start: Bullet turns what it makes by a last bit
+        self._measure()
 
     def rebuild(self) -> None:
         """Begin anew with another client: all bodies are where the scene starts, and nothing is known of contacts."""
@@ -158,6 +161,36 @@ class Engine:
                     found[uid].append(place)
         # Bullet takes a link that a fixed joint holds to what stands, or to the first link, as standing: it never wakes
         return [own if all(own) else [] for own in found.values()]
+
+    def _compared(self, wanted: bool) -> Boxes:
+        """The boxes of the trees that Bullet compares, which may be taken out of that; none unless ``wanted``."""
+        at, owner = find_owners(self._boxes if wanted else 0)
+        tree_of = {uid: k for k, tree in enumerate(self.trees) for uid in tree.bases}
+        live = [i for i, (*_, group, mask) in enumerate(self._colliders) if (group, mask) != VOID] if len(at) else []
+        found = boxes(len(self.trees), len(live), len(at))
+        found.phase[0] = self._boxes
+        found.at[:], found.owner[:] = at[live], owner[live]
+        found.tree[:] = [tree_of[self._colliders[i][0]] for i in live]
+        found.row[live] = np.arange(len(live))
+        return found
+
+    def _measure(self) -> None:
+        """Find how far anything of a tree is from what it turns about, with sliding joints at 0, for `Boxes.reach`."""
+        motions, arrays = self.motions, self.motions.trees
+        if not len(arrays.boxes.at):
+            return
+        motions.everything()
+        for k, tree in enumerate(self.trees):
+            rows = slice(arrays.begin[k], arrays.begin[k + 1])
+            chain = np.linalg.norm(arrays.fixed[rows, 3:6], axis=1) + np.linalg.norm(arrays.fixed[rows, 10:13], axis=1)
+            reach = 0.0
+            for uid, link, group, mask in self._colliders:
+                if uid == tree.uid and (group, mask) != VOID:
+                    corners = np.array(pybullet.getAABB(uid, link, physicsClientId=self.client))
+                    farthest = np.abs(corners - motions.pose[motions.row(k, link), :3]).max(axis=0)
+                    reach = max(reach, float(np.linalg.norm(farthest)))
+            arrays.boxes.reach[k] = chain.sum() + reach
+        motions.forget_all()
 
     def collide(self, uid: int, group: int, mask: int) -> None:
         """Set group and mask of the base of a multibody that was added to the scene's own."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ligature.physics import trees as kernels
 from ligature.physics.articulation import Tree
+from ligature.physics.parking import Boxes
 from ligature.tables import table_of
 
 Array = NDArray[np.float64]
@@ -40,11 +41,13 @@ class Motions:
         (r, 3) forces at the centres of mass, for `apply_gravity`.
     """
 
-    def __init__(self, client: int, handle: int, trees: Sequence[Tree], sleepers: Sequence[Sequence[int]]) -> None:
+    def __init__(
+        self, client: int, handle: int, trees: Sequence[Tree], sleepers: Sequence[Sequence[int]], compared: Boxes
+    ) -> None:
         self._client, self.handle = client, handle
         rows = np.cumsum([0, *(1 + len(tree.frames) for tree in trees)])
         axes = np.cumsum([0, *(len(tree.axes) for tree in trees)])
-        arrays = self.trees = kernels.trees(len(trees), int(rows[-1]), int(axes[-1]), sum(map(len, sleepers)))
+        arrays = self.trees = kernels.trees(len(trees), int(rows[-1]), int(axes[-1]), sum(map(len, sleepers)), compared)
         arrays.sleepers[:] = [sleeper for found in sleepers for sleeper in found]
         arrays.sleepers_begin[1:] = np.cumsum([len(found) for found in sleepers])
         arrays.uid[:] = [tree.uid for tree in trees]
@@ -135,6 +138,7 @@ class Motions:
     def forget(self, tree: int) -> None:
         """A tree was put elsewhere; what rests on one that stands is to notice it."""
         self.trees.read[tree] = self.trees.linked[tree] = False
+        self.trees.boxes.moved[tree] = np.inf
         self.rouse(tree)
         if not self.trees.going[tree]:
             self._read_base(tree)

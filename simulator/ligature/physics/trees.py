@@ -34,6 +34,7 @@ from ligature.physics.bullet import (
     slept,
     submit,
 )
+from ligature.physics.parking import Boxes, boxes, park, unpark
 from ligature.tables import opener
 
 Array = NDArray[np.float64]
@@ -47,6 +48,10 @@ BASE_Q, BASE_U = 7, 6
 
 REST_SPEED = 1e-12
 """Speed in rad/s or m/s below which joints that nothing pushes stand: at this one, an hour makes 4 nm."""
+
+
+TURN_PER_CHORD = math.pi
+"""Angle over the distance of two unit quaternions that are at most half a turn apart, from above."""
 
 
 class Trees(NamedTuple):
@@ -88,9 +93,10 @@ class Trees(NamedTuple):
     answer: Integers  # (5,) its own address, and where Bullet puts what `read_tree` asks for
     wanted: Array  # (9,) what is on its way to Bullet: a twist, or force, torque and point
     wanted_at: Integers  # (1,) its address
+    boxes: Boxes
 
 
-def trees(count: int, rows: int, axes: int, sleepers: int = 0) -> Trees:
+def trees(count: int, rows: int, axes: int, sleepers: int = 0, compared: Boxes | None = None) -> Trees:
     """Arrays for ``count`` trees with these numbers of rows, axes and colliders that may sleep."""
     z, whole, no = np.zeros, np.int64, np.bool_
     answer, wanted = z(5, whole), z(9)
@@ -104,7 +110,7 @@ def trees(count: int, rows: int, axes: int, sleepers: int = 0) -> Trees:
         rows=np.full((rows, 3), -1), fixed=z((rows, 17)), mass=z(rows), inertia=z((rows, 3)),
         pose=z((rows, 7)), twist=z((rows, 6)), frame=z((rows, 7)), speed=z((rows, 6)), joints=z((3, axes)),
         reaction=z((axes, 6)), force=z((rows, 3)), load=z((rows, 6)), push=z(axes), answer=answer,
-        wanted=wanted, wanted_at=np.array([wanted.ctypes.data]),
+        wanted=wanted, wanted_at=np.array([wanted.ctypes.data]), boxes=compared or boxes(count),
     )  # fmt: skip
 
 
@@ -152,8 +158,13 @@ def step_world(handle: int, table: Integers, limit: float) -> bool:
         if trees.asleep[k]:
             for i in range(trees.sleepers_begin[k], trees.sleepers_begin[k + 1]):
                 let_sleep(trees.sleepers[i])
+        stands = not (trees.going[k] or trees.turning[k]) and trees.quiet[k]
+        trees.boxes.parked[k] = trees.asleep[k] or stands
+    park(trees.boxes)
     submit(handle, init_step(handle))
+    unpark(trees.boxes)
     for k in range(trees.uid.shape[0]):
+        trees.boxes.moved[k] = 0.0
         trees.asleep[k] = trees.asleep[k] and slept(trees.sleepers[trees.sleepers_begin[k]])
     pass_tick(trees)
     for k in range(trees.uid.shape[0]):
@@ -176,6 +187,7 @@ def _read_moved(handle: int, trees: Trees, k: int) -> None:
         trees.before[i] = trees.joints[0, i]
         rested = rested and trees.joints[1, i] == 0.0
     read_tree(handle, trees, k)
+    trees.boxes.moved[k] = _moved(trees, k)
     if creeps(trees, k):
         _halt(handle, trees, k)
     still = rested and trees.quiet[k] and trees.sleepers_begin[k] < trees.sleepers_begin[k + 1]
@@ -189,6 +201,25 @@ def _read_moved(handle: int, trees: Trees, k: int) -> None:
             for a in range(6):
                 still = still and trees.reaction[i, a] == 0.0
     trees.still[k] = still
+
+
+@inlined
+def _moved(trees: Trees, k: int) -> float:
+    """How far any point of tree ``k`` has moved in a tick at most, since `Trees.wanted` and `Trees.before`."""
+    old, new, reach = trees.wanted, trees.pose[trees.begin[k]], trees.boxes.reach[k]
+    shift, one, other = 0.0, 0.0, 0.0
+    for a in range(3):
+        shift += (new[a] - old[a]) ** 2
+    for a in range(3, 7):
+        one, other = one + (new[a] - old[a]) ** 2, other + (new[a] + old[a]) ** 2
+    for r in range(trees.begin[k] + 1, trees.begin[k + 1]):
+        joint = trees.rows[r, 2]
+        if joint >= 0 and trees.rows[r, 1] == SLIDES:
+            reach += max(abs(trees.joints[0, joint]), abs(trees.before[joint]))
+    moved = math.sqrt(shift) + reach * TURN_PER_CHORD * math.sqrt(min(one, other))
+    for i in range(trees.first[k], trees.first[k + 1]):
+        moved += max(reach, 1.0) * abs(trees.joints[0, i] - trees.before[i])
+    return moved
 
 
 @inlined
