@@ -64,7 +64,7 @@ $(STAMPS)/debian-tests: debian-packages-tests.txt $(STAMPS)/debian
 	@sh .ci/install_debian_packages.sh debian-packages-tests.txt --optional || echo "going on without them: their tests are skipped"
 	@touch $@
 
-$(STAMPS)/python-tests: requirements-dev.txt $(STAMPS)/python
+$(STAMPS)/python-tests: requirements-dev.txt $(STAMPS)/package
 	@$(STEP) "installing the Python packages of requirements-dev.txt, about a minute" $(PIP) -r requirements.txt -r requirements-dev.txt
 	@touch $@
 
