@@ -84,6 +84,9 @@ RETRIES, ATTEMPTS = (0, 2, -2, 3), 3
 """Elements beside the first choice at which jaws that closed on nothing try again; how often a throw is tried."""
 
 SLOW, BRISK, FAST, CAREFUL = 0.03, 0.06, 0.08, 0.015
+REACH = 0.5
+"""Metres that no tool goes at once."""
+
 PULL, DRAWN, MOST = 0.3, 1.0, 8.0
 """Newtons with which a loop is drawn close, a throw is drawn tight, and the most."""
 
@@ -240,6 +243,9 @@ class TwoArms:
         start, opening = {name: self.tools[name].copy() for name in goals}, {name: self.jaws[name] for name in jaws}
         turn = {name: rotation_vector(start[name][:3, :3].T @ T[:3, :3]) for name, T in goals.items()}
         way = {name: T[:3, 3] - start[name][:3, 3] for name, T in goals.items()}
+        for name, w in way.items():
+            if not float(np.linalg.norm(w)) < REACH:
+                raise Missed(f"{name} was to go {float(np.linalg.norm(w)):.2g} m, farther than it reaches")
         seconds = [
             STREAM,
             *(float(np.linalg.norm(w)) / speed for w in way.values()),
@@ -375,10 +381,14 @@ class Knotter(TwoArms):
 
     def _sweep(self, root: Array, length: float, a: Array, b: Array, R: Array, S: Array) -> None:
         """What the right arm holds goes about ``root`` from the direction ``a`` to ``b``; its tool turns to ``S``."""
-        angle, turn = np.arccos(np.clip(a @ b, -1.0, 1.0)), rotation_vector(R.T @ S)
+        about, turn = np.cross(a, b), rotation_vector(R.T @ S)
+        sine = float(np.linalg.norm(about))
+        angle = float(np.arctan2(sine, a @ b))
+        if sine < 1e-9:  # opposite ways: about any axis across them
+            about = np.cross(a, np.eye(3)[int(np.argmin(np.abs(a)))])
         size = float(np.linalg.norm(turn))
         for share in np.linspace(0.0, 1.0, 9)[1:]:
-            way = b if angle < 1e-6 else (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
+            way = axis_rotation(_unit(about), share * angle) @ a
             now = R @ axis_rotation(turn / size, share * size) if size > 1e-6 else R
             self.go({RIGHT: frame(now, root + STRETCHED * length * way - DEEP * now[:, 2])}, speed=BRISK)
 
