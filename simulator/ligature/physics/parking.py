@@ -67,6 +67,8 @@ def boxes(trees: int, count: int = 0, places: int = 0) -> Boxes:
 @inlined
 def park(boxes: Boxes) -> None:
     """Take out what need not be compared in the coming tick; `unpark` is to follow."""
+    if boxes.at.shape[0] == 0:  # without boxes there is no address of the broad phase either
+        return
     for k in range(boxes.parked.shape[0]):
         if not (boxes.parked[k] or boxes.moved[k] < np.inf):
             return
