@@ -23,6 +23,7 @@ from ligature.model.shapes import Cylinder
 from ligature.robots.operating_state import Rejected
 from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
+from ligature.tasks.diagrams import Diagram
 from ligature.tasks.knots import HALF_KNOT, SquareKnotScore
 from ligature.tasks.throws import drawn_back, pose_of
 
@@ -80,12 +81,12 @@ loop to the root of the jaws, and between it passes in front of them."""
 BELOW, OVER = 0.013, 0.0075
 """Metres that the left tool keeps below the right one, and over the vessel."""
 
-RETRIES, ATTEMPTS = (0, 2, -2, 3), 3
+RETRIES, ATTEMPTS = (0, 2, -2, 3), 5
 """Elements beside the first choice at which jaws that closed on nothing try again; how often a throw is tried."""
 
 SLOW, BRISK, FAST, CAREFUL = 0.03, 0.06, 0.08, 0.015
-REACH = 0.5
-"""Metres that no tool goes at once."""
+FAR, REACH = 1.0, 0.5
+"""Metres along the shafts at which a thread is closed to see its knot; metres that no tool goes at once."""
 
 PULL, DRAWN, MOST = 0.3, 1.0, 8.0
 """Newtons with which a loop is drawn close, a throw is drawn tight, and the most."""
@@ -122,6 +123,17 @@ def radius_for(anchor: Array, angle: float, length: float, most: float = 0.045) 
     radii = np.linspace(THINNEST, most, 200)
     fits = [radius for radius in radii if length_around(anchor, angle, radius) <= length]
     return float(max(fits, default=THINNEST))
+
+
+def drawn(thread: Array, right: Array, left: Array) -> Diagram:
+    """The knot that tools at ``right`` and ``left`` (4, 4) make of a ``thread`` (n, 3) when they draw its ends away.
+
+    The right one takes the first end, the left one holds the last; along their shafts the thread is closed far away. If
+    it goes ``n`` times around the right tool, each time nearer to the first end, it is the torus knot (2, 2 n + 1).
+    """
+    pads = [T[:3, 3] + DEEP * T[:3, 2] for T in (right, left)]
+    far = [T[:3, 3] - FAR * T[:3, 2] for T in (right, left)]
+    return Diagram.of(np.vstack([far[0], pads[0], thread, pads[1], far[1]]))
 
 
 class TwoArms:
@@ -301,6 +313,11 @@ class Knotter(TwoArms):
         empty = all(self.simulation.grasps[name] is None for name in self.arms)
         return SquareKnotScore.of(self.points(), self.vessel, self._radius, self.tension(), empty, self.simulation.time)
 
+    def made(self) -> bool:
+        """Whether the thread has one throw more than before, square with the one before."""
+        score = self.score()
+        return (score.determinant, abs(score.signature)) == (HALF_KNOT ** (self.throws + 1), 2 * (1 - self.throws))
+
     def leaves(self) -> tuple[int, int]:
         """The elements at which the short end and the long end leave the vessel, or the knot on it."""
         points, beside = self.points(), 1.3 * self._radius
@@ -314,6 +331,13 @@ class Knotter(TwoArms):
             if (np.linalg.norm(points[np.abs(np.arange(len(points)) - i) >= 8] - points[i], axis=1)).min() < 0.0011
         ]
         return (touching[0], touching[-1]) if touching else (int(near.min()), int(near.max()))
+
+    def laced(self) -> bool:
+        """Whether the throw is a knot once its ends are drawn, square with the one before."""
+        held = self.held(RIGHT)
+        first = self.tail if held is None else held
+        diagram = drawn(self.points()[first : self.must_hold(LEFT) + 1], self.tools[RIGHT], self.tools[LEFT])
+        return (diagram.determinant, abs(diagram.signature)) == (HALF_KNOT ** (self.throws + 1), 2 * (1 - self.throws))
 
     def looped(self, first: int) -> bool:
         """Whether the thread, from element ``first`` to the left hand, goes about the right arm's jaws or shaft."""
@@ -436,12 +460,11 @@ class Knotter(TwoArms):
             self.go({LEFT: self._left_at(at)}, speed=BRISK)
         snug = at + (0.045 - radius) * way + [0.004, 0.0, 0.0]
         self.go({LEFT: self._left_at(snug)}, speed=SLOW, until=lambda: self.pull() > SNUG)
-        if not self.looped(first):
+        if not self.laced():
             raise Missed(f"the loop slipped off {RIGHT}")
 
     def seize(self) -> None:
         """The right arm goes forward and takes the short end; the left one follows, and keeps the loop on its jaws."""
-        first = self.leaves()[1]
         off = self.tools[LEFT][:3, 3] + DEEP * self.tools[LEFT][:3, 2] - drawn_back(self.tools[RIGHT], ROOT)[:3, 3]
         away = float(np.linalg.norm(off))
         off = off / away
@@ -465,7 +488,7 @@ class Knotter(TwoArms):
             self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.006)}, speed=SLOW, meanwhile=keep)
         else:
             raise Missed(f"{RIGHT} did not find the short end")
-        if not self.looped(first):
+        if not self.laced():
             raise Missed(f"the loop slipped off {RIGHT}")
 
     def draw_through(self) -> None:
@@ -522,19 +545,24 @@ class Knotter(TwoArms):
                 self.seize()
                 self.draw_through()
                 self.tighten()
-                if self.score().determinant == HALF_KNOT ** (self.throws + 1):
+                if self.made():
                     break
                 raise Missed(f"throw {self.throws + 1} came undone")
             except Missed:
                 if attempt + 1 == ATTEMPTS:
                     raise
                 self.start_again()
+                if self.made():  # the hands were in the way, or an end lay across the other
+                    break
         self.throws, self.side = self.throws + 1, -self.side
 
     def start_again(self) -> None:
         """The right arm lets go and draws back; the left one goes to its side, and takes the long end if it lost it."""
         self.go({}, {RIGHT: OPEN})
-        self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.04)}, speed=SLOW)
+        self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.012)}, speed=SLOW)
+        self.go({}, {RIGHT: SHUT})  # a loop slips off closed jaws
+        self.go({RIGHT: drawn_back(self.tools[RIGHT], 0.03)}, speed=SLOW)
+        self.tail = TAIL
         if self.held(LEFT) is None:
             self.go({LEFT: frame(np.eye(3), [0.0, 0.0, 0.03]) @ self.tools[LEFT]}, {LEFT: OPEN}, speed=BRISK)
             self.take(LEFT, TAKES, len(self.thread) - HELD, -1)

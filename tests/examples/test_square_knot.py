@@ -46,6 +46,26 @@ def test_the_left_tool_never_draws_the_thread_taut_but_where_it_must_keep_clear(
     assert radius == square_knot.THINNEST or square_knot.length_around(anchor, angle, radius) <= length
 
 
+@given(st.integers(-4, 4), st.floats(0.004, 0.012), st.floats(-0.002, 0.002), st.integers(0, 2**32 - 1))
+def test_a_thread_around_the_right_tool_is_drawn_to_the_torus_knot_of_its_turns(
+    turns: int, radius: float, aside: float, seed: int
+) -> None:
+    """Of 2 n + 1 crossings: determinant ``|2 n + 1|``, signature ``|2 n + 1| - 1`` (Livingston, Knot Theory, 1993)."""
+    right = square_knot.frame(np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]), [0.0, 0.0, 0.03])
+    way = square_knot.TAKES / np.linalg.norm(square_knot.TAKES)
+    across = np.cross([0.0, 1.0, 0.0], way) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], way))
+    left = square_knot.frame(np.column_stack([across, np.cross(way, across), way]), [0.01, 0.03, 0.06])
+    below = np.array([[-0.02, aside, 0.03], [0.0, -0.003, 0.0], [0.0, 0.003, 0.0], [0.008, 0.016, 0.02]])
+    angle = np.linspace(0.0, 2.0 * np.pi * turns, 40 * abs(turns) + 2)
+    towards_the_tip = np.linspace(0.008, 0.002, len(angle))
+    around = np.column_stack([towards_the_tip, radius * np.cos(angle), 0.03 + radius * np.sin(angle)])
+    thread = np.vstack([below, around])
+    thread += np.random.default_rng(seed).uniform(-1e-5, 1e-5, thread.shape)
+    found, crossings = square_knot.drawn(thread, right, left), 2 * turns + 1
+    assert found.determinant == abs(crossings)
+    assert found.signature == np.sign(crossings) * (abs(crossings) - 1)
+
+
 def test_a_thread_that_nobody_wraps_has_no_knot() -> None:
     simulation = ligature.Simulation(ligature.load(square_knot.SCENE))
     score = square_knot.Knotter(simulation).score()
