@@ -73,3 +73,19 @@ def test_what_a_command_imports_late_is_among_them() -> None:
 def test_an_interrupt_that_the_caller_ignores_is_ignored() -> None:
     done = started("typer", "ignored")
     assert done.returncode == 0 and "0 errors" in done.stdout, done.stderr
+
+
+AGAIN = """
+import os, signal, threading
+from ligature.cli import command
+
+for _ in range(20):  # as a program does that calls commands and takes the signal back
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    command.take_interrupts()
+print(sum(thread.name == "interrupts" for thread in threading.enumerate()), len(os.listdir("/proc/self/fd")) < 20)
+"""
+
+
+def test_one_thread_watches_a_process_however_many_commands_it_runs() -> None:
+    done = subprocess.run([sys.executable, "-c", AGAIN], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.split() == ["1", "True"]

@@ -8,6 +8,7 @@ import what they need when they need it, so this holds as long as they run.
 from __future__ import annotations
 
 import errno
+import functools
 import importlib
 import io
 import os
@@ -74,7 +75,7 @@ def take_interrupts() -> None:
     """Have SIGINT end this process wherever it arrives; see above."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # ignored, as under nohup, it stays ignored
         signal.signal(signal.SIGINT, _interrupt)
-        _Deadline().start()
+        _deadline().watch()
 
 
 class _Deadline(threading.Thread):
@@ -85,10 +86,13 @@ class _Deadline(threading.Thread):
 
     def __init__(self) -> None:
         super().__init__(name="interrupts", daemon=True)
-        self._reader, writer = os.pipe2(os.O_CLOEXEC)
-        os.set_blocking(writer, False)
-        signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-        os.register_at_fork(after_in_child=_forget_wakeups)
+        self._reader, self._writer = os.pipe2(os.O_CLOEXEC)
+        os.set_blocking(self._writer, False)
+        self.start()
+
+    def watch(self) -> None:
+        """Have Python write the number of every signal that arrives from now on; called in the main thread."""
+        signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
 
     def run(self) -> None:
         """Read the numbers of signals as they arrive, whatever the main thread does."""
@@ -102,9 +106,17 @@ class _Deadline(threading.Thread):
                 os._exit(128 + signal.SIGINT)
 
 
+@functools.cache
+def _deadline() -> _Deadline:
+    """The one of this process."""
+    os.register_at_fork(after_in_child=_forget_wakeups)
+    return _Deadline()
+
+
 def _forget_wakeups() -> None:
-    """Leave the pipe to the parent: what a forked process gets does not concern it."""
+    """Leave pipe and thread to the parent: what a forked process gets does not concern it."""
     signal.set_wakeup_fd(-1)
+    _deadline.cache_clear()
 
 
 @contextmanager
