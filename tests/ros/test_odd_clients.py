@@ -1,7 +1,8 @@
 """Clients that are odd but legal: wrong types, latched, many, forgetful, with odd services' arguments and parameters.
 
 What they send is generated, for topics, services and parameters that are asked of the master. Afterwards the run answers
-as before, its poses are finite, and its scene rests.
+as before, its poses are finite, and its scene rests. Run it alone: what a process has advertised with a wrong type, rospy
+offers again to every later test of that process, whose subscribers then wait for messages in vain.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from tests.ros.conftest import BIN, SMALL, Program
 from tests.ros.test_flood import answers, commands, distinct, filled
 from tests.waiting import stays, until
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
 ODD: tuple[Any, ...] = (
     -1, 0, 1e308, -5e-324, 2**31 - 1, "", "nan", "ünïcødé 🪡", "x" * 100_000, True, [], [1, "a", {}], [[[]]], {"a": {}},
     "PERSPECTIVE", "/ambf/env/nothing",
