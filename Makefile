@@ -68,7 +68,7 @@ $(STAMPS)/python-tests: requirements-dev.txt $(STAMPS)/package
 	@$(STEP) "installing the Python packages of requirements-dev.txt, about a minute" $(PIP) -r requirements.txt -r requirements-dev.txt
 	@touch $@
 
-lint: developers
+lint: $(STAMPS)/python-tests
 	.venv/bin/ruff format --check .
 	.venv/bin/ruff check .
 	.venv/bin/mypy

@@ -53,16 +53,21 @@ def copy_into(typing_context: Any, target: Any, source: Any) -> Any:
 
 
 def opener(example: NamedTuple) -> Callable[[Any], Any]:
-    """A function for compiled code that turns a table back into a group of the types of ``example``."""
+    """A function for compiled code that turns a table, or its address, into a group of the types of ``example``."""
     kind = typeof(example)
 
     @intrinsic  # type: ignore[misc]
     def open_table(typing_context: Any, table: Any) -> Any:
+        address = isinstance(table, types.Integer)
+
         def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            words = make_array(signature.args[0])(context, builder, arguments[0]).data
+            if address:
+                words = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
+            else:
+                words = make_array(signature.args[0])(context, builder, arguments[0]).data
             return _group_at(context, builder, kind, words, 0)[0]
 
-        return kind(types.Array(types.int64, 1, "C")), build
+        return kind(types.intp if address else types.Array(types.int64, 1, "C")), build
 
     opened: Callable[[Any], Any] = open_table
     return opened

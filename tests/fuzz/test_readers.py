@@ -1,4 +1,4 @@
-"""Sixteen hundred files of strangers that are no scenes, and the hostile ones that were thought of; `make fuzz` runs more."""
+"""Eight hundred files of strangers that are no scenes, and the hostile ones that were thought of; `make fuzz` runs more."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from tests.fuzz.run import run
 
 
 def test_no_file_of_a_stranger_crashes_hangs_or_surprises() -> None:
-    outcome = run(100 * len(READERS), jobs=2, campaign=CAMPAIGN, chunk=200)
+    outcome = run(50 * len(READERS), jobs=2, campaign=CAMPAIGN, chunk=200)
     assert outcome.failures == []
     for reader in READERS:
         assert outcome.ended[f"{reader.kind} refused"] > 5, reader.kind
-        assert outcome.ended[f"{reader.kind} clean"] + outcome.ended[f"{reader.kind} refused"] == 100
+        assert outcome.ended[f"{reader.kind} clean"] + outcome.ended[f"{reader.kind} refused"] == 50
 
 
 @pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.kind)

@@ -34,25 +34,30 @@ def test_a_second_simulator_of_the_same_world_ends_and_states_what_to_do(
     assert listen("/ambf/env/World/State", WorldState).comes_at(20, seconds=0.5)
 
 
-def test_a_simulator_with_a_prefix_lives_beside_it(start: Callable[..., Program], listen: Callable[..., Any]) -> None:
+@pytest.fixture(scope="module")
+def left(start: Callable[..., Program]) -> Iterator[Program]:
+    """A simulator with a prefix."""
+    program = start(BIN / "ligature", "run", SMALL, "-p", "100", "--ns", "/left", "--src-crtk")
+    program.wait_for("first state published")
+    yield program
+    assert program.end() == 0
+    assert "stays silent" not in program.output
+
+
+def test_a_simulator_with_a_prefix_lives_beside_it(left: Program, listen: Callable[..., Any]) -> None:
     from ambf_msgs.msg import RigidBodyState
 
-    second = start(BIN / "ligature", "run", SMALL, "-p", "100", "--ns", "/left")
-    second.wait_for("first state published")
     for prefix in ("", "/left"):
         message = listen(f"{prefix}/ambf/env/phantom/Needle/State", RigidBodyState).wait()
         assert message.identifier.data == f"{prefix}/ambf/env/phantom/BODY Needle"
-    assert "left out" not in second.output
-    assert second.end() == 0
+    assert "left out" not in left.output
 
 
-def test_frames_of_two_simulators_are_distinguished(start: Callable[..., Program], listen: Callable[..., Any]) -> None:
+def test_frames_of_two_simulators_are_distinguished(left: Program, listen: Callable[..., Any]) -> None:
     from geometry_msgs.msg import PoseStamped
     from sensor_msgs.msg import CameraInfo
     from tf2_msgs.msg import TFMessage
 
-    second = start(BIN / "ligature", "run", SMALL, "-p", "100", "--ns", "/left")
-    second.wait_for("first state published")
     tf, fixed = listen("/tf", TFMessage), listen("/tf_static", TFMessage)
     info = listen("/left/ambf/env/cameras/cameraL/CameraInfo", CameraInfo).wait(seconds=60.0)
     poses = {
@@ -71,29 +76,23 @@ def test_frames_of_two_simulators_are_distinguished(start: Callable[..., Program
     assert set(poses.values()) == {"left/PSM1_base", "left/HRSV", "left/Cart"}
     half = [pair for pair in seen() if pair[0].startswith("left/") != pair[1].startswith("left/")]
     assert half == []  # no frame of one hangs below a frame of the other
-    assert second.end() == 0
 
 
 @pytest.fixture(scope="module")
-def both(start: Callable[..., Program], node: Any) -> Iterator[dict[str, Any]]:
+def both(left: Program, start: Callable[..., Program], node: Any) -> Iterator[dict[str, Any]]:
     """A PSM of each of two simulators with prefixes, beside the one without."""
     from tests.ros import crtk
 
-    programs = [
-        start(BIN / "ligature", "run", SMALL, "-p", "100", "--no-cameras", "--ns", f"/{side}", "--src-crtk")
-        for side in ("left", "right")
-    ]
-    for program in programs:
-        program.wait_for("first state published")
+    right = start(BIN / "ligature", "run", SMALL, "-p", "100", "--no-cameras", "--ns", "/right", "--src-crtk")
+    right.wait_for("first state published")
     arms = {side: crtk.Psm(node, f"{side}/PSM1") for side in ("left", "right")}
     for arm in arms.values():
         arm.check_connections(10.0)
     yield arms
     for arm in arms.values():
         arm.close()
-    for program in programs:
-        assert program.end() == 0
-        assert "stays silent" not in program.output
+    assert right.end() == 0
+    assert "stays silent" not in right.output
 
 
 def test_two_simulators_with_prefixes_are_driven_independently(both: dict[str, Any], node: Any) -> None:

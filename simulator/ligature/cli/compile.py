@@ -27,8 +27,14 @@ from ligature.robots.psm import Psm
 from ligature.tasks.plans import COARSE, throws
 from ligature.tasks.throws import NeedleArc, Throw
 
-COMPILED_SCENES = tuple(SCENES / name / "launch.yaml" for name in ("suturing", "soft_suturing"))
-"""Bundled scenes that between them need nearly all kernels."""
+COMPILED_SCENES = tuple(
+    tuple(SCENES / name / "launch.yaml" for name in names)
+    for names in (("suturing",), ("needle_insertion", "soft_suturing"))
+)
+"""Bundled scenes that between them need nearly all kernels, by process.
+
+One begins with threads; the other with bodies and tissue, so that it need not wait for the first.
+"""
 
 TICKS = 300
 """Ticks that each scene runs, of which arms find their home for the last part."""
@@ -42,25 +48,27 @@ FIRM = 20.0
 
 def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
     """Compile what ``scenes`` need, or what most need; returns 1 when one of them cannot run."""
-    scenes = scenes or COMPILED_SCENES
+    groups = [(scene,) for scene in scenes] or COMPILED_SCENES
     begin = time.monotonic()
     console.print(
-        f"compiling the kernels of {counted(len(scenes), 'scene')} in parallel; this takes 2 to 4 minutes, once"
+        f"compiling the kernels of {counted(sum(map(len, groups)), 'scene')} in "
+        f"{counted(len(groups), 'process', 'processes')}; this takes 2 to 4 minutes, once"
     )
-    running = {scene: _start(scene, console) for scene in scenes}
+    running = {group: _start(group, console) for group in groups}
     status = 0
-    for scene, (process, reader) in running.items():
+    for group, (process, reader) in running.items():
         reader.join()
         if process.wait():
-            console.print(f"{scene} cannot run (status {process.returncode})", style="red", markup=False)
+            names = ", ".join(map(str, group))
+            console.print(f"{names} cannot run (status {process.returncode})", style="red", markup=False)
             status = 1
     console.print(f"compiled after {time.monotonic() - begin:.0f} s")
     return status
 
 
-def _start(scene: Path, console: Console) -> tuple[subprocess.Popen[str], threading.Thread]:
-    """A process that runs ``scene``, and the thread that shows what it prints."""
-    command = [sys.executable, "-m", "ligature.cli.compile", str(scene)]
+def _start(scenes: Sequence[Path], console: Console) -> tuple[subprocess.Popen[str], threading.Thread]:
+    """A process that runs ``scenes`` one by one, and the thread that shows what it prints."""
+    command = [sys.executable, "-m", "ligature.cli.compile", *map(str, scenes)]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", preexec_fn=end_with_parent
     )
@@ -68,7 +76,7 @@ def _start(scene: Path, console: Console) -> tuple[subprocess.Popen[str], thread
     def show() -> None:
         assert process.stdout is not None
         for line in process.stdout:
-            console.print(f"{scene.parent.name or scene}: {line.rstrip()}", style="dim", markup=False)
+            console.print(f"{scenes[-1].parent.name or scenes[-1]}: {line.rstrip()}", style="dim", markup=False)
 
     reader = threading.Thread(target=show, daemon=True)
     reader.start()
@@ -135,7 +143,8 @@ def _draw(simulation: ligature.Simulation) -> None:
 
 if __name__ == "__main__":
     try:
-        run_for_a_moment(Path(sys.argv[1]))
+        for argument in sys.argv[1:]:
+            run_for_a_moment(Path(argument))
     except ligature.SceneError as error:
         sys.exit(str(error))
     except OSError as error:

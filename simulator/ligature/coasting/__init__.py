@@ -75,7 +75,9 @@ def _kernel(threads: bool) -> Callable[..., tuple[int, int, bool]]:
     """The compiled ticks of a scene with ``threads``, or without: it loads nothing of threads then."""
     if threads:
         from ligature.coasting.threads import coast
+        from ligature.suture.ticking import offer_ticks
 
+        offer_ticks()
         return coast
     from ligature.coasting import bodies
 

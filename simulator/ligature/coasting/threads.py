@@ -14,7 +14,7 @@ from ligature.suture.colliders import LOOKS, NEAR
 from ligature.suture.placing import look, open_watch
 from ligature.suture.searching import LOOKED, SEARCHED, SOLVED
 from ligature.suture.substeps import open_rod
-from ligature.suture.ticking import RodTick, open_rod_tick, pass_tick, surround
+from ligature.suture.ticking import RodTick, call_tick_rod, open_rod_tick, surround
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -85,7 +85,7 @@ def _pass_rods(
     for r in range(rods.shape[0]):
         tick = open_rod_tick(rods[r])
         _hold_driven(tick, driven)
-        pass_tick(tick)
+        call_tick_rod(rods[r].ctypes.data)
         rod = open_rod(tick.rod)
         for m in range(rod.counts[4]):
             node = rod.pushed[m]

@@ -459,7 +459,7 @@ class Rod:
         if self._pads:
             self._find_grasped()
         self._begin_pushes()
-        tick_rod(self.tick_table)
+        tick_rod(self.tick_table.ctypes.data)
         self._end_pushes()
         self.conclude()
         self._end_pulls()

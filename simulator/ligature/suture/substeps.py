@@ -185,7 +185,7 @@ def run_tick(
     old, new, in_c = a, b, False
     # In units of the smallest step: what of the tick is done, the next step, that of the loads, and of those kept.
     done, size, scale, kept = 0, MAX_PARTS, MAX_PARTS, MAX_PARTS
-    steps, careful = 0, False
+    steps, careful = 0, done > 0  # a constant would make Numba compile what depends on it twice
     while done < MAX_PARTS:
         h = dt * size / MAX_PARTS
         if size != scale:

@@ -1,4 +1,8 @@
-"""Ticks of rods for compiled code that does other parts of a tick, too: what one takes is one table for each rod."""
+"""Ticks of rods for compiled code that does other parts of a tick, too: what one takes is one table for each rod.
+
+Other kernels call `tick_rod` by its address. Numba would make its code, two thirds of all, part of each of them, which
+took half a minute of compilation and 10 MB of each process.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.kernel_links import link, offer
 from ligature.kernels import inlined, kernel
 from ligature.suture.substeps import open_rod, run_tick
 from ligature.tables import opener
@@ -51,9 +56,13 @@ open_rod_tick = opener(
 )
 
 
-@inlined
-def pass_tick(tick: RodTick) -> None:
-    """One tick of a rod; see `run_tick`. Its contacts then are the last tick's."""
+@kernel
+def tick_rod(address: int) -> None:
+    """One tick of the rod whose `RodTick` has its table at ``address``; see `run_tick`.
+
+    Its contacts then are the last tick's.
+    """
+    tick = open_rod_tick(address)
     last, next_, scratch = tick.order[0], tick.order[1], tick.order[2]
     run_tick(
         tick.rod, tick.touches[last], tick.touches[next_], tick.touches[scratch], tick.passages, tick.owner[0],
@@ -65,10 +74,13 @@ def pass_tick(tick: RodTick) -> None:
         tick.order[0], tick.order[1], tick.order[2] = next_, scratch, last
 
 
-@kernel
-def tick_rod(table: Integers) -> None:
-    """`pass_tick` for a table of a `RodTick`."""
-    pass_tick(open_rod_tick(table))
+call_tick_rod = link("ligature_tick_rod")
+"""`tick_rod` for other kernels; `offer_ticks` comes before the first of them is loaded."""
+
+
+def offer_ticks() -> None:
+    """Compile or load `tick_rod`, and let other kernels call it."""
+    offer("ligature_tick_rod", tick_rod)
 
 
 @inlined
