@@ -75,7 +75,8 @@ lint: $(STAMPS)/python-tests
 	.venv/bin/lint-imports
 
 # they watch real time, and mostly wait: all others run meanwhile, where they leave time
-IN_REAL_TIME := tests/ros tests/cockpit \
+OF_ROS_AT_ANY_TIME := $(foreach test,conversion launch_files messages names package,tests/ros/test_$(test).py)
+IN_REAL_TIME := $(filter-out $(OF_ROS_AT_ANY_TIME),$(wildcard tests/ros/test_*.py)) tests/cockpit \
   $(foreach test,ambf_simulator master physics recorder replay set_up supervisor,tests/cli/test_$(test).py)
 unit: developers blender-module
 	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python sh .ci/unit_tests.sh $(PYTHON) $(IN_REAL_TIME)

@@ -31,6 +31,14 @@ def _shared(variable: str, default: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def hulls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Moving meshes collide as their hulls: CoACD would take minutes for those of others, and here no piece matters."""
+    from ligature.mesh.surface import hull_vertices  # Blender's Python has no `ligature`, and reads this file
+
+    monkeypatch.setattr("ligature.physics.shapes.convex_pieces", lambda points, *_: [hull_vertices(points)])
+
+
 @pytest.fixture(scope="session")
 def corpus() -> Path:
     """Folder of real scenes of others; skips when it is absent."""

@@ -241,6 +241,7 @@ def test_a_disk_that_becomes_full_costs_the_cache_and_not_the_run(program: str, 
     assert "kernels cannot be kept and will be compiled again at the next start" in done.stderr
 
 
+@pytest.mark.slow  # `.ci/bare_machine.sh` does the same
 @pytest.mark.timeout(900)
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become somebody else")
 def test_somebody_who_owns_nothing_can_simulate() -> None:

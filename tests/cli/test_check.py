@@ -81,6 +81,7 @@ def test_the_looks_of_a_mesh_that_only_collides_are_not_reported(tmp_path: Path,
     assert "material library" in str(findings(tmp_path / "m.yaml", [], False))
 
 
+@pytest.mark.usefixtures("hulls")
 def test_no_finding_of_the_corpus_is_about_the_looks_of_what_is_not_drawn(corpus: Path) -> None:
     for launch in ("suturing_scene/launch.yaml", "multibodies/descriptions/launch.yaml"):
         found = findings(corpus / launch, [corpus], False)
