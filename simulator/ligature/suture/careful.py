@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
-from ligature.suture.chain import factor, solve
-from ligature.suture.coupled_solve import couple, gather
+from ligature.suture.coupled_solve import solve_coupled
 from ligature.suture.coupling import add_closed, conclude_contacts, open_contacts, rigid
 from ligature.suture.layout import Joints, Nodes, Touches, Work
 from ligature.suture.passage_forces import add_passage_forces, settle_passages
@@ -240,12 +239,7 @@ def _solve_linearised(
         copy_into(work.H, work.own_matrix)
         copy_into(work.g, work.own_load)
         add_tangents(nodes, touches, work, stiffness, dt)
-        low, high, rows = gather(n, total, nodes, touches, work)
-        top = high if high >= 0 else n // 2
-        factor(n, top, nodes.fixed, work.H, work.lever, work.B, work.compliance, work.Y, work.Z, work.felt)
-        solve(n, top, work.lever, work.B, work.Y, work.Z, work.c, work.g, work.d, work.load, work.felt_load)
-        if rows > 0:
-            couple(n, low, high, rows, nodes, touches, work, MAX_CG, CG_TOLERANCE)
+        solve_coupled(n, total, nodes, touches, work, MAX_CG, CG_TOLERANCE)
         find_displacements(nodes, touches, work, dt)
         # Where it begins nothing is in balance, so that the first solve counts in full.
         go(n, total, nodes, joints, touches, work, 1.0 if solves == 0 else least_share(touches, work, stiffness))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
-from ligature.suture.chain import invert_spd6, solve, solve_within
+from ligature.suture.chain import factor, invert_spd6, solve, solve_within
 from ligature.suture.coupling import push
 from ligature.suture.layout import Nodes, Touches, Work
 from ligature.suture.rotations import cross, rotate
@@ -24,6 +24,22 @@ MAX_CG = 40
 
 CG_TOLERANCE = 1e-6
 """Residual energy, relative to the first, at which the coupling is solved, as a rule."""
+
+
+@inlined
+def solve_coupled(
+    n: int, total: int, nodes: Nodes, touches: Touches, work: Work, most: int = MAX_CG, tolerance: float = CG_TOLERANCE
+) -> None:
+    """Correction ``work.d`` and joint loads ``work.load`` of a linearised step: of the chain and of what it touches.
+
+    At most ``most`` iterations of the coupling leave a residual energy of ``tolerance``, relative to the first.
+    """
+    low, high, rows = gather(n, total, nodes, touches, work)
+    top = high if high >= 0 else n // 2
+    factor(n, top, nodes.fixed, work.H, work.lever, work.B, work.compliance, work.Y, work.Z, work.felt)
+    solve(n, top, work.lever, work.B, work.Y, work.Z, work.c, work.g, work.d, work.load, work.felt_load)
+    if rows > 0:
+        couple(n, low, high, rows, nodes, touches, work, most, tolerance)
 
 
 @kernel
@@ -118,8 +134,8 @@ def couple(
 ) -> None:
     """Complete ``work.d`` and ``work.load`` by the coupling of contacts between movable nodes.
 
-    ``low``, ``high``, ``rows`` are from `gather`; the chain's elimination must end at ``high``. ``most`` iterations
-    leave a residual energy of ``tolerance``, relative to the first.
+    ``low``, ``high``, ``rows`` are from `gather`; the chain's elimination must end at ``high``. ``most`` and
+    ``tolerance`` are those of `solve_coupled`.
     """
     for m in range(rows):
         if work.rows[m] >= n:

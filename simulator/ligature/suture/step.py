@@ -11,8 +11,7 @@ from __future__ import annotations
 import math
 
 from ligature.kernels import inlined, kernel
-from ligature.suture.chain import factor, solve
-from ligature.suture.coupled_solve import CG_TOLERANCE, MAX_CG, couple, gather
+from ligature.suture.coupled_solve import solve_coupled
 from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
 from ligature.suture.layout import Joints, Nodes, Touches, Work
 from ligature.suture.passage_forces import add_passage_forces, settle_passages
@@ -248,12 +247,7 @@ def advance(
         add_contacts(nodes, touches, work, stiffness, dt)
         add_passage_forces(passages, owner, nodes, work, elapsed, dt)
         add_springs(springs, nodes, work, dt)
-        low, high, rows = gather(n, total, nodes, touches, work)
-        top = high if high >= 0 else n // 2
-        factor(n, top, nodes.fixed, work.H, work.lever, work.B, work.compliance, work.Y, work.Z, work.felt)
-        solve(n, top, work.lever, work.B, work.Y, work.Z, work.c, work.g, work.d, work.load, work.felt_load)
-        if rows > 0:
-            couple(n, low, high, rows, nodes, touches, work, MAX_CG, CG_TOLERANCE)
+        solve_coupled(n, total, nodes, touches, work)
         changed = settle_contacts(nodes, touches, work, stiffness, dt)
         largest = correct(n, total, nodes, work)
         changed = settle_passages(passages, owner, nodes, elapsed) or changed
