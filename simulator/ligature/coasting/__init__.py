@@ -6,14 +6,14 @@ Every other subsystem has stated that it is idle; see `ligature.model.subsystem.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ligature.coasting.clock import clock
+from ligature.coasting.ticks import coast
 from ligature.physics import World
 from ligature.physics.divergence import MAX_SPEED
 from ligature.suture import Suture
+from ligature.suture.ticking import offer_ticks
 
 PHASES = ("control", "suture", "bodies")
 """Phases of a tick that are timed here, in order."""
@@ -31,8 +31,10 @@ class Coasting:
     def __init__(self, world: World, suture: Suture) -> None:
         self._world, self._suture, self._dt = world, suture, world.dt
         self.spent, self._corners, self._clock = np.zeros(len(PHASES)), np.zeros((2, 3)), clock()
-        self._kernel = _kernel(threads=bool(suture.rods.rods))
-        self._coast(0)  # loads the kernel, which a run would stand still for
+        # loads the kernels now: a run would stand still for them
+        if suture.rods.rods:
+            offer_ticks()
+        self._coast(0)
 
     @property
     def begins(self) -> bool:
@@ -63,22 +65,8 @@ class Coasting:
         threads = (
             world.impulses.total, world.commands.drives, rods.colliders.table, rods.colliders.indices,
             rods.tick_tables(), self._corners,
-        ) if rods.rods else ()  # fmt: skip
-        found: tuple[int, int, bool] = self._kernel(
+        ) if rods.rods else None  # fmt: skip
+        return coast(
             *world.always, world.impulses.acted, self._suture.holes.search_table, self._clock, self.spent, self._dt,
-            MAX_SPEED, ticks, int(begins), *threads,
+            MAX_SPEED, ticks, int(begins), threads,
         )  # fmt: skip
-        return found
-
-
-def _kernel(threads: bool) -> Callable[..., tuple[int, int, bool]]:
-    """The compiled ticks of a scene with ``threads``, or without: it loads nothing of threads then."""
-    if threads:
-        from ligature.coasting.threads import coast
-        from ligature.suture.ticking import offer_ticks
-
-        offer_ticks()
-        return coast
-    from ligature.coasting import bodies
-
-    return bodies.coast

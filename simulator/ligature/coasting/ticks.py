@@ -1,4 +1,4 @@
-"""Ticks of a scene with threads, as compiled code."""
+"""Ticks in which only bodies, joints and threads have work, as compiled code."""
 
 from __future__ import annotations
 
@@ -20,23 +20,26 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
+Threads = tuple[Array, Flags, Integers, Integers, Integers, Array]
+"""What the ticks of threads take: sums of impulses, as `Impulses.total`; which bodies a command moves (bodies,); the
+table of a `Watch` of bodies and their numbers; the `Rods.tick_tables`; and (2, 3) scratch."""
+
 
 @kernel
 def coast(
     handle: int, tree_table: Integers, axis_table: Integers, place_table: Integers, slowed: Integers, factors: Array,
     lifted: Integers, forces: Array, acted: Flags, search: Integers, clock: Integers, spent: Array, dt: float,
-    limit: float, ticks: int, begins: int, total: Array, driven: Flags, watch_table: Integers, watched: Integers,
-    rods: Integers, corners: Array,
+    limit: float, ticks: int, begins: int, threads: Threads | None,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Advance by up to ``ticks``, and where ``begins`` is 1 begin another one, up to the step of the bodies.
 
     It ends after one in which anything is not finite or has a speed not below ``limit``, and within one in which
-    something has entered a hole, or other bodies are near the ``rods`` than before.
+    something has entered a hole, or other bodies are near the threads than before.
 
-    The first arguments are those of `prepare`; ``total`` and ``acted`` are those of `Impulses`, ``search`` the table of
-    a `Search`, ``driven`` (bodies,) those that a command moves; ``spent`` (3,) adds up seconds by phase. Returns how
-    many ticks passed; how far another one has begun, as `Suture.conclude` takes it; and whether all trees of bodies
-    are finite and slow enough.
+    The first arguments are those of `prepare`; ``acted`` is that of `Impulses`, ``search`` the table of a `Search`;
+    ``spent`` (3,) adds up seconds by phase. Without ``threads`` nothing of them is compiled. Returns how many ticks
+    passed; how far another one has begun, as `Suture.conclude` takes it; and whether all trees of bodies are finite
+    and slow enough.
     """
     begin = now(clock)
     for passed in range(ticks + begins):
@@ -47,9 +50,11 @@ def coast(
         spent[0] += prepared - begin
         if find_passages(handle, tree_table, place_table, search):
             return passed, SEARCHED, True
-        if _look_around(handle, tree_table, place_table, watch_table, watched, rods, corners, dt):
-            return passed, LOOKED, True
-        whole = _pass_rods(handle, tree_table, place_table, rods, total, acted, driven, dt)
+        whole = True
+        if threads is not None:
+            if _look_around(handle, tree_table, place_table, threads, dt):
+                return passed, LOOKED, True
+            whole = _pass_rods(handle, tree_table, place_table, threads, acted, dt)
         moved = now(clock)
         spent[1] += moved - prepared
         if passed == ticks:
@@ -63,11 +68,9 @@ def coast(
 
 
 @inlined
-def _look_around(
-    handle: int, tree_table: Integers, place_table: Integers, watch_table: Integers, watched: Integers, rods: Integers,
-    corners: Array, dt: float,
-) -> bool:  # fmt: skip
+def _look_around(handle: int, tree_table: Integers, place_table: Integers, threads: Threads, dt: float) -> bool:
     """Bring the bodies near the rods up to date; whether they are others than before."""
+    _total, _driven, watch_table, watched, rods, corners = threads
     if watched.shape[0] == 0:
         return False
     surround(rods, corners)
@@ -77,10 +80,10 @@ def _look_around(
 
 @inlined
 def _pass_rods(
-    handle: int, tree_table: Integers, place_table: Integers, rods: Integers, total: Array, acted: Flags,
-    driven: Flags, dt: float,
-) -> bool:  # fmt: skip
+    handle: int, tree_table: Integers, place_table: Integers, threads: Threads, acted: Flags, dt: float
+) -> bool:
     """A tick of all rods, and their impulses on bodies; whether the rods are finite and slow enough."""
+    total, driven, _watch_table, _watched, rods, _corners = threads
     whole = True
     for r in range(rods.shape[0]):
         tick = open_rod_tick(rods[r])
