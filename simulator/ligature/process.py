@@ -48,7 +48,8 @@ def amid_import(frame: FrameType | None) -> bool:
 def signals_held() -> Iterator[None]:
     """Signals that end this process wait until the block has ended, and with it the files that it writes.
 
-    For blocks of milliseconds. On other threads than the main one, which alone sets handlers, it has no effect.
+    For blocks of milliseconds; they may be nested. On other threads than the main one, which alone sets handlers, it
+    has no effect.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -60,6 +61,8 @@ def signals_held() -> Iterator[None]:
 
     before = {number: signal.getsignal(number) for number in _ENDING}
     heard = {number: handler for number, handler in before.items() if handler not in (signal.SIG_IGN, None)}
+    if callable(timer := signal.getsignal(signal.SIGALRM)):  # an interrupt tries again; else it ends what hangs
+        heard[signal.SIGALRM] = timer
     try:
         for number in heard:
             signal.signal(number, hold)

@@ -10,7 +10,7 @@ import pytest
 
 LOST = """
 import os, signal, sys, weakref
-from ligature.datasets.interrupts import interrupted_once, uninterrupted
+from ligature.datasets.interrupts import interrupted_once
 
 class Held:
     pass
@@ -45,4 +45,44 @@ def test_an_interrupt_that_is_lost_comes_again_and_never_into_the_clean_up(name:
         [sys.executable, "-c", LOST.replace("{name}", name)], capture_output=True, text=True, timeout=60
     )
     assert done.stdout == f"cleaned up {int(getattr(signal, name))}\n", done.stderr
+    assert done.returncode == 0
+
+
+WRITING = """
+import os, signal, weakref
+from ligature.datasets import interrupts
+from ligature.process import signals_held
+
+class Held:
+    pass
+
+def lose(_):
+    os.kill(os.getpid(), signal.{name})
+    sum(range(1000))
+
+interrupts._LATER = 30.0  # its alarm is sent below
+held = Held()
+watch = weakref.ref(held, lose)
+try:
+    with interrupts.interrupted_once():
+        if {before}:
+            del held
+        with signals_held():
+            if {before}:
+                signal.raise_signal(signal.SIGALRM)
+            else:
+                del held
+            print("whole")
+        print("not interrupted")
+except KeyboardInterrupt as interrupt:
+    print(*interrupt.args)
+"""
+
+
+@pytest.mark.parametrize("before", [True, False], ids=["lost before", "while writing"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_an_interrupt_waits_for_what_is_being_written(name: str, before: bool) -> None:
+    code = WRITING.replace("{name}", name).replace("{before}", str(before))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout == f"whole\n{int(getattr(signal, name))}\n", done.stderr
     assert done.returncode == 0

@@ -1,8 +1,4 @@
-"""An orderly end for programs that record: the first signal interrupts, later ones wait until all is on the disk.
-
-HDF5 calls back into Python to write, and swallows what is raised there: while a dataset is being written, a signal is
-kept and interrupts afterwards.
-"""
+"""An orderly end for programs that record: the first signal interrupts, later ones wait until all is on the disk."""
 
 from __future__ import annotations
 
@@ -19,9 +15,6 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _LATER = 0.02
 """Seconds after which an interrupt tries again that was lost, or that came amid an import."""
 
-_writing = 0
-_kept = 0
-
 
 @contextmanager
 def interrupted_once() -> Iterator[None]:
@@ -30,7 +23,6 @@ def interrupted_once() -> Iterator[None]:
     The exception has the number of the signal as its argument. Where it is lost, as in an object's clean-up or a
     callback from C, it is raised again. For the main thread of a program.
     """
-    global _kept
     first: list[int] = []
 
     def interrupt(number: int, frame: FrameType | None) -> None:
@@ -39,17 +31,12 @@ def interrupted_once() -> Iterator[None]:
             again(number, frame)
 
     def again(number: int, frame: FrameType | None) -> None:
-        global _kept
         if isinstance(sys.exc_info()[1], KeyboardInterrupt):
             return  # it is on its way out
-        if _writing:
-            _kept = first[0]
-            return
         signal.setitimer(signal.ITIMER_REAL, _LATER)
         if not amid_import(frame):
             raise KeyboardInterrupt(first[0])
 
-    _kept = 0
     alarm = signal.signal(signal.SIGALRM, again)
     heard = [number for number in _ENDING if signal.getsignal(number) is not signal.SIG_IGN]  # as under nohup
     before: dict[int, Any] = {number: signal.signal(number, interrupt) for number in heard}
@@ -60,17 +47,3 @@ def interrupted_once() -> Iterator[None]:
         signal.signal(signal.SIGALRM, alarm)
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Keep a signal that `interrupted_once` takes until the end of the block; it interrupts there."""
-    global _writing, _kept
-    _writing += 1
-    try:
-        yield
-    finally:
-        _writing -= 1
-    if _kept and not _writing:
-        number, _kept = _kept, 0
-        raise KeyboardInterrupt(number)

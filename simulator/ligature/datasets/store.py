@@ -29,6 +29,12 @@ class DatasetError(RuntimeError):
     """A dataset that cannot be written or read; the message gives the reason."""
 
 
+def unwritable(path: Path, error: OSError | RuntimeError, kept: str = "") -> DatasetError:
+    """The error of a dataset that could not be written because of ``error``; ``kept`` says what is whole of it."""
+    why = reason(error) if isinstance(error, OSError) else str(error)
+    return DatasetError(f"cannot write the dataset '{path}': {why}{kept}")
+
+
 class _Disk(io.FileIO):
     """A file that keeps the first ``error`` of writing to itself: HDF5 crashes when its disk is full."""
 

@@ -18,13 +18,12 @@ import numpy as np
 import ligature
 from ligature.camera_simulation import Simulation
 from ligature.datasets.events import ARM_EVENTS, NEEDLE_EVENTS, EventWatch
-from ligature.datasets.interrupts import uninterrupted
 from ligature.datasets.labels import ACTIVITIES, GESTURES, MOST_PHASES, ActivityWatch
 from ligature.datasets.rows import EpisodeRows, add_actions
-from ligature.datasets.store import DatasetError, EpisodeStore
+from ligature.datasets.store import EpisodeStore, unwritable
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
 from ligature.model.soft import TissueBody
-from ligature.paths import reason
+from ligature.process import signals_held
 
 if TYPE_CHECKING:  # datasets of motion need no OpenGL
     from ligature.render.target import Exposure
@@ -100,7 +99,7 @@ class DatasetWriter:
         try:
             self._store = EpisodeStore(path, self._describe)
         except OSError as error:
-            raise DatasetError(f"cannot write the dataset '{path}': {reason(error)}") from error
+            raise unwritable(path, error) from error
 
     def _describe(self, file: h5py.File) -> None:
         """Write the attributes that are the same for all episodes."""
@@ -280,20 +279,22 @@ class DatasetWriter:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Reports errors of the disk in one way, and discards the present episode then."""
-        try:
-            with uninterrupted():
-                yield
-        except (OSError, RuntimeError) as error:
-            self._ended = True
-            self._forget()
-            kept = f"; {self.count} episodes are whole" if self.count else ""
+        """Reports errors of the disk in one way, and discards the present episode then.
+
+        Signals wait: HDF5 calls back into Python to write, and swallows what a handler raises there.
+        """
+        with signals_held():
             try:
-                self._store.close(empty=False)
-            except (OSError, RuntimeError) as second:
-                kept += f" ({second})" if self.count else ""
-            why = reason(error) if isinstance(error, OSError) else str(error)
-            raise DatasetError(f"cannot write the dataset '{self._path}': {why}{kept}") from error
+                yield
+            except (OSError, RuntimeError) as error:
+                self._ended = True
+                self._forget()
+                kept = f"; {self.count} episodes are whole" if self.count else ""
+                try:
+                    self._store.close(empty=False)
+                except (OSError, RuntimeError) as second:
+                    kept += f" ({second})" if self.count else ""
+                raise unwritable(self._path, error, kept) from error
 
     def __enter__(self) -> DatasetWriter:
         return self
