@@ -16,7 +16,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ligature import Simulation
-from ligature.simulation import _simulations
+from ligature.simulation.unreferenced import simulations
 
 SMALL = Path(__file__).resolve().parents[1] / "scenes" / "suturing_small" / "launch.yaml"
 BOX = "{{name: {name}, mass: 1, shape: BOX, geometry: {{x: 1, y: 1, z: 1}}, location: {{position: {{x: {x}, y: 0, z: 0}}}}}}"
@@ -111,7 +111,7 @@ def no_collector() -> Iterator[None]:
 @pytest.mark.parametrize("closes", [True, False])
 def test_simulations_that_nobody_holds_are_freed(tmp_path: Path, no_collector: None, closes: bool) -> None:
     scene, made = ligature.load(_box(tmp_path, ["a"])), []
-    most = 10 + 2 * len(_simulations)  # of other tests too
+    most = 10 + 2 * len(simulations)  # of other tests too
     for _ in range(30):
         simulation = Simulation(scene)
         simulation.step(2)

@@ -38,7 +38,7 @@ def pair(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Simulation, Sim
     def make(of: Scene | None = None) -> tuple[Simulation, Simulation, list[int]]:
         of = of or scene()
         first, second, passed = Simulation(of), Simulation(of), [0, 0]
-        coast = first._coasting.pass_ticks
+        coast = first._ticking.coasting.pass_ticks
 
         def counted(ticks: int, begins: bool = False) -> tuple[int, int]:
             found, begun = coast(ticks, begins)
@@ -46,8 +46,8 @@ def pair(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Simulation, Sim
             passed[1] += begun > 0
             return found, begun
 
-        monkeypatch.setattr(first._coasting, "pass_ticks", counted)
-        monkeypatch.setattr(second._coasting, "pass_ticks", lambda ticks, begins: (0, 0))
+        monkeypatch.setattr(first._ticking.coasting, "pass_ticks", counted)
+        monkeypatch.setattr(second._ticking.coasting, "pass_ticks", lambda ticks, begins: (0, 0))
         return first, second, passed
 
     return make
@@ -220,7 +220,7 @@ def test_a_coast_that_fails_is_reported_and_the_run_goes_on(monkeypatch: pytest.
         raise ZeroDivisionError("broken on purpose")
 
     with monkeypatch.context() as patch:
-        patch.setattr(simulation._coasting, "pass_ticks", broken)
+        patch.setattr(simulation._ticking.coasting, "pass_ticks", broken)
         before = simulation._clock.tick
         simulation.step(20)
         assert simulation._clock.tick == before + 20

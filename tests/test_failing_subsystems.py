@@ -13,7 +13,7 @@ from ligature.coasting import Coasting
 from ligature.model.commands import BodyCommand, CommandType, Reset
 from ligature.model.scene import Scene
 from ligature.model.subsystem import Subsystem
-from ligature.simulation import REST
+from ligature.simulation.subsystems import REST
 
 from tests.conftest import ROOT
 
@@ -36,7 +36,7 @@ def simulation() -> Simulation:
 def afresh(simulation: Simulation) -> None:
     simulation.reset()
     simulation.problems.clear()
-    simulation._reported.clear()
+    simulation._subsystems._reported.clear()
 
 
 def subsystem(simulation: Simulation, name: str) -> Subsystem:
@@ -101,14 +101,14 @@ def test_what_a_subsystem_raises_is_reported_once_and_the_run_goes_on(
     simulation.problems.clear()
     simulation.reset()
     simulation.step(5)
-    assert simulation.problems == [] and simulation._resting == {}
+    assert simulation.problems == [] and simulation._subsystems.resting == {}
 
 
 @pytest.mark.parametrize("name", STEPPING)
 def test_a_subsystem_that_failed_rests_goes_on_and_is_reported_anew(
     simulation: Simulation, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    monkeypatch.setattr("ligature.simulation.REST", 10)
+    monkeypatch.setattr("ligature.simulation.subsystems.REST", 10)
     one, calls = subsystem(simulation, name), []
     step = one.step
 

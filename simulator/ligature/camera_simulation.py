@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from ligature import simulation
+from ligature.model.handles import Handles
 
 if TYPE_CHECKING:
     from ligature.render.cameras import CameraHandle, Studio
@@ -24,7 +25,7 @@ class Simulation(simulation.Simulation):
     _studio: Studio | None = None
 
     @cached_property
-    def cameras(self) -> simulation.Handles[CameraHandle]:
+    def cameras(self) -> Handles[CameraHandle]:
         """Cameras of the scene by name; raises ImportError when OpenGL's Python package is missing."""
         from ligature.render.cameras import Studio, camera_handles
 

@@ -85,7 +85,7 @@ def test_a_needle_goes_ten_times_from_arm_to_arm_without_a_jolt(held: Theatre, m
 
     def watched(ticks: int = 1) -> None:
         for _ in range(ticks):
-            sim._advance(1)
+            sim._ticking.advance(1)
             for name in strongest:
                 force = np.linalg.norm(sim._world.wrenches.on(held.tools(name), np.zeros(3))[:3])
                 strongest[name] = max(strongest[name], float(force))

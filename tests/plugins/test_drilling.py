@@ -55,7 +55,7 @@ def go(sim: Simulation, at: list[float], ticks: int) -> None:
 
 
 def bone(sim: Simulation) -> Any:
-    return sim._plugins._plugins[0].volume
+    return sim._parts.plugins._plugins[0].volume
 
 
 def test_the_slices_are_those_of_the_script(tmp_path: Path) -> None:
@@ -195,7 +195,7 @@ def test_bodies_and_rays_meet_what_is_left(with_ball: Scene) -> None:
     ball.set_pose([0.006, 0.004, 0.02, 0, 0, 0, 1])
 
     def hit(x: float) -> tuple[int, float]:
-        hits = sim._plugins._host.rays([[x, 0, 0.1]], [[x, 0, -0.1]])
+        hits = sim._parts.plugins._host.rays([[x, 0, 0.1]], [[x, 0, -0.1]])
         return int(hits.body[0]), float(hits.point[0, 2])
 
     assert hit(0.001) == (index, pytest.approx(TOP, abs=1e-4))
@@ -286,7 +286,7 @@ def test_a_hole_is_drawn_with_its_depth_and_number() -> None:
     camera = sim.cameras["main"]
     before = camera.capture((96, 72))
     volume = bone(sim)
-    with sim._plugins._host.before_step():
+    with sim._parts.plugins._host.before_step():
         removed = volume.cut([0, 0, 0.02], [0, 0, 0.009], 0.003)
     assert removed > 500
     sim.step(0)
@@ -308,14 +308,14 @@ def test_a_hole_is_drawn_with_its_depth_and_number() -> None:
 def test_a_bone_that_is_drilled_away_is_not_drawn() -> None:
     pytest.importorskip("moderngl")
     sim = drilling()
-    with sim._plugins._host.before_step():
+    with sim._parts.plugins._host.before_step():
         bone(sim).cut([0, 0, 0], [0, 0, 0], 1.0)
     sim.step(1500)
     assert bone(sim).count == 0 and not sim.problems
     frame = sim.cameras["main"].capture((64, 48))
     number = {name: n for n, name in sim.scene.drawn_names.items()}[sim.bodies["Bone"].body.identity.identifier]
     assert not (frame.ids == number).any()
-    assert not len(sim._plugins._host.contacts(sim.bodies["Bone"].body.index))
+    assert not len(sim._parts.plugins._host.contacts(sim.bodies["Bone"].body.index))
     sim.close()
 
 
@@ -335,8 +335,8 @@ def test_a_bone_that_is_drilled_away_is_not_drawn() -> None:
 )
 def test_what_a_plugin_cannot_ask_of_a_volume_is_named(call: Any, reason: str) -> None:
     sim = driven()
-    with sim._plugins._host.before_step(), pytest.raises((ValueError, LookupError), match=reason):
-        call(sim._plugins._host)
+    with sim._parts.plugins._host.before_step(), pytest.raises((ValueError, LookupError), match=reason):
+        call(sim._parts.plugins._host)
     with pytest.raises(RuntimeError, match="cut in before_step"):
         bone(sim).cut([0, 0, 0], [0, 0, 0], 1e-3)
 

@@ -111,11 +111,11 @@ def test_a_plugin_outside_the_folders_of_the_scene_is_left_out(tmp_path: Path) -
 def test_hooks_come_in_their_order(simulate: Make) -> None:
     code = "log = []\n" + "".join(f"def {hook}(self): self.log.append('{hook}')\n" for hook in HOOKS[:5])
     sim = simulate(code)
-    log = type(sim._plugins._plugins[0]).log
+    log = type(sim._parts.plugins._plugins[0]).log
     sim.step(2)
     sim.reset()
     sim.close()
-    sim._plugins.close()
+    sim._parts.plugins.close()
     assert log == ["on_load", *2 * ["before_step", "after_step"], "on_reset", "on_close"]
 
 
@@ -132,7 +132,7 @@ def test_a_push_is_felt_in_the_same_tick_and_hooks_see_the_present(simulate: Mak
     """
     sim = simulate(code)
     sim.step(50)
-    seen = np.array(sim._plugins._plugins[0].seen)
+    seen = np.array(sim._parts.plugins._plugins[0].seen)
     assert seen[:, 0] == pytest.approx(2.0 * 1e-3 * np.arange(1, 51), rel=1e-6)
     assert np.diff(seen[:, 1]) == pytest.approx(seen[1:, 0] * 1e-3, rel=1e-6)
     assert abs(sim.bodies["Ball"].pose[2]) < 1e-6
@@ -151,7 +151,7 @@ def test_a_plugin_of_a_body_has_it_and_gives_commands_and_reads_joints(simulate:
     """
     sim = simulate(code, on_body=True)
     sim.step(100)
-    plugin = sim._plugins._plugins[0]
+    plugin = sim._parts.plugins._plugins[0]
     assert plugin.body.identity.name == "Ball"
     assert sim.bodies["Ball"].pose[0] == pytest.approx(0.01, abs=1e-4)
     assert plugin.angle == pytest.approx((sim.joints["Hinge"].position, sim.joints["Hinge"].velocity), abs=1e-12)
@@ -248,7 +248,7 @@ def test_a_hook_that_fails_switches_its_plugin_off_and_the_run_goes_on(simulate:
         each.step(5)
     assert sim.bodies["Ball"].pose.tobytes() == alone.bodies["Ball"].pose.tobytes()
     sim.close()
-    problems = [p for p in [*sim.problems, *sim._plugins.take_problems()] if p.code == "plugin"]
+    problems = [p for p in [*sim.problems, *sim._parts.plugins.take_problems()] if p.code == "plugin"]
     # a snapshot is restored at once here, and that of before the failure switches the plug-in on again
     assert len(problems) == (2 if hook == "restore" else 1)
     assert problems[0].severity is Severity.ERROR
@@ -318,5 +318,5 @@ def test_two_plugins_of_one_name_get_two(tmp_path: Path) -> None:
     scene = ligature.load(tmp_path / "m.yaml")
     assert [plugin.name for plugin in scene.plugins] == ["mine", "mine_2", "mine_3"]
     sim = Simulation(scene, allow_plugins=True)
-    kinds = {type(plugin) for plugin in sim._plugins._plugins}
+    kinds = {type(plugin) for plugin in sim._parts.plugins._plugins}
     assert len(kinds) == 3 and all(issubclass(kind, Plugin) for kind in kinds)
