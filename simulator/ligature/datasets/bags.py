@@ -6,7 +6,7 @@ newtons; poses in the base of the arm, that of the needle as the bag has it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,8 @@ import ligature
 from ligature.datasets.interrupts import interrupted_once
 from ligature.datasets.labels import ACTIVITIES, MOVING, MarkedPhases
 from ligature.datasets.rows import EpisodeRows, add_actions
-from ligature.datasets.store import DatasetError, EpisodeStore
+from ligature.datasets.store import DatasetError, EpisodeStore, unwritable
 from ligature.datasets.writer import FORMAT, JOINT_ROWS, POSE, WRENCH
-from ligature.paths import reason
 from ligature.ros.bags import BagError
 from ligature.ros.tracks import Session, first_stamp, intrinsics, pictures, session
 
@@ -68,24 +67,17 @@ def record_bag(
         if name not in found.cameras:
             raise BagError(f"{bag}: has no pictures of '{name}', only of {', '.join(found.cameras) or 'none'}")
     marked = MarkedPhases(found.phases)
-    stamps, times = _grid(bag, found, rate, [found.cameras[name] for name in named])
+    topics = {name: found.cameras[name] for name in named}
+    stamps, times = _grid(bag, found, rate, list(topics.values()))
     try:
         store = EpisodeStore(out, lambda file: _describe(file, found, marked, rate, text))
     except OSError as error:
-        raise DatasetError(f"cannot write the dataset '{out}': {reason(error)}") from error
+        raise unwritable(out, error) from error
     try:
         with interrupted_once():
             episode = store.begin()
             _write_motion(episode, found, marked, stamps, times)
-            rows = EpisodeRows(episode)
-            for name in named:
-                K = intrinsics(bag, found.cameras[name], size)
-                for picture in pictures(bag, found.cameras[name], stamps.tolist(), size):
-                    rows.append(f"cameras/{name}/rgb", picture, "u1", picture=True)
-                    store.check()
-                    if K is not None:
-                        rows.append(f"cameras/{name}/intrinsics", K, "f8", units="px")
-            rows.finish()
+            _write_pictures(episode, store, bag, topics, stamps, size)
             attributes = episode.attrs
             attributes["success"], attributes["judged"] = bool(success), success is not None
             attributes["samples"], attributes["task"], attributes["why"] = len(times), text, why
@@ -95,8 +87,7 @@ def record_bag(
     except BaseException as error:
         store.close(empty=False)
         if isinstance(error, OSError | RuntimeError) and not isinstance(error, DatasetError):
-            why = reason(error) if isinstance(error, OSError) else str(error)
-            raise DatasetError(f"cannot write the dataset '{out}': {why}") from error
+            raise unwritable(out, error) from error
         raise
     return len(times)
 
@@ -162,6 +153,21 @@ def _write_motion(episode: h5py.File, found: Session, marked: MarkedPhases, stam
         add(f"arms/{name}/activity", _moves(arm.tracks["local_measured_cp"].at(stamps)[:, :3], times), "u1")
     if found.needle is not None:
         add("needle/pose", found.needle.at(stamps), "f4", units="m", axes=POSE)
+
+
+def _write_pictures(
+    episode: h5py.File, store: EpisodeStore, bag: Path, topics: Mapping[str, str], stamps: Array, size: tuple[int, int]
+) -> None:
+    """The newest picture of each camera at the ``stamps``; ``topics`` are those of the cameras, by their names."""
+    rows = EpisodeRows(episode)
+    for name, topic in topics.items():
+        K = intrinsics(bag, topic, size)
+        for picture in pictures(bag, topic, stamps.tolist(), size):
+            rows.append(f"cameras/{name}/rgb", picture, "u1", picture=True)
+            store.check()
+            if K is not None:
+                rows.append(f"cameras/{name}/intrinsics", K, "f8", units="px")
+    rows.finish()
 
 
 def _moves(places: Array, times: Array) -> NDArray[np.bool_]:

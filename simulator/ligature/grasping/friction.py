@@ -356,23 +356,12 @@ def solve(motion_table: Integers, grasp_table: Integers, room_table: Integers, d
     """
     moves, grasps, room = open_motions(motion_table), open_grasps(grasp_table), open_scratch(room_table)
     body_pose, body_twist, impulse = moves.body_pose, moves.body_twist, moves.impulse
-    palm_pose, palm_twist, inverse_mass = moves.palm_pose, moves.palm_twist, moves.inverse[0]
-    n = grasps.patch.shape[0]
+    inverse_mass, n = moves.inverse[0], grasps.patch.shape[0]
     _inverse_inertia(body_pose, moves.inverse[1:], room.S, room.W)
     for k in range(6):
         room.twist[k] = body_twist[k]
     for g in range(n):
-        _place(g, body_pose, palm_pose, grasps, room)
-        at, h, pads, limits = room.at[g], palm_pose[g], grasps.pads[g], room.limits[g]
-        limits[0], limits[1], limits[2] = friction_limits(pads[0], pads[1], pads[2])
-        _velocity(room.R[g], palm_twist[g], at[0] - h[0], at[1] - h[1], at[2] - h[2], room.drift[g])
-        _fill_impedance(g, inverse_mass, at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2], room, dt)
-        for row in range(6):
-            change = room.drift[g, row] - grasps.pace[g, row]
-            grasps.pace[g, row] = room.drift[g, row]
-            grasps.lag[g, row] = (1.0 - dt / CATCH_UP) * grasps.lag[g, row] - dt * change
-            room.error[g, row] -= grasps.lag[g, row]
-            grasps.load[g, row] = 0.0
+        _begin(g, moves, grasps, room, dt)
     for _ in range(SWEEPS):
         bounded = False
         for g in range(n):
@@ -382,21 +371,43 @@ def solve(motion_table: Integers, grasp_table: Integers, room_table: Integers, d
     for k in range(6):
         impulse[0, k] = 0.0
     for g in range(n):
-        at, h, load, total = room.at[g], palm_pose[g], grasps.load[g], room.step
-        fx, fy, fz = rotate(room.R[g], load[0], load[1], load[2])
-        mx, my, mz = rotate(room.R[g], load[3], load[4], load[5])
-        for side in range(2):
-            i, c, sign = (0, body_pose, 1.0) if side == 0 else (1 + g, h, -1.0)
-            ax, ay, az = cross(at[0] - c[0], at[1] - c[1], at[2] - c[2], fx, fy, fz)
-            total[0], total[1], total[2], total[3], total[4], total[5] = fx, fy, fz, mx + ax, my + ay, mz + az
-            for k in range(6):
-                impulse[i, k] = sign * total[k] + (impulse[0, k] if side == 0 else 0.0)
-        for row in range(6):
-            load[row] /= dt
-        rx, ry, rz = at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2]
-        _velocity(room.R[g], room.twist, rx, ry, rz, room.ask)
-        for row in range(6):
-            room.ask[row] -= room.drift[g, row]
-        _follow(
-            g, room.error[g], room.ask, load, grasps.held, grasps.slid, grasps.slides[g, 0], grasps.slides[g, 1], dt
-        )
+        _conclude(g, moves, grasps, room, dt)
+
+
+@inlined
+def _begin(g: int, moves: Motions, grasps: GraspArrays, room: Scratch, dt: float) -> None:
+    """Equations of grasp ``g`` in this tick: its place, limits and impedance, and the errors that it takes off."""
+    body_pose, palm_pose = moves.body_pose, moves.palm_pose
+    _place(g, body_pose, palm_pose, grasps, room)
+    at, h, pads, limits = room.at[g], palm_pose[g], grasps.pads[g], room.limits[g]
+    limits[0], limits[1], limits[2] = friction_limits(pads[0], pads[1], pads[2])
+    _velocity(room.R[g], moves.palm_twist[g], at[0] - h[0], at[1] - h[1], at[2] - h[2], room.drift[g])
+    _fill_impedance(g, moves.inverse[0], at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2], room, dt)
+    for row in range(6):
+        change = room.drift[g, row] - grasps.pace[g, row]
+        grasps.pace[g, row] = room.drift[g, row]
+        grasps.lag[g, row] = (1.0 - dt / CATCH_UP) * grasps.lag[g, row] - dt * change
+        room.error[g, row] -= grasps.lag[g, row]
+        grasps.load[g, row] = 0.0
+
+
+@inlined
+def _conclude(g: int, moves: Motions, grasps: GraspArrays, room: Scratch, dt: float) -> None:
+    """Impulses of grasp ``g`` on body and holder; its loads become forces, and what exceeds its limits slips."""
+    body_pose, impulse = moves.body_pose, moves.impulse
+    at, h, load, total = room.at[g], moves.palm_pose[g], grasps.load[g], room.step
+    fx, fy, fz = rotate(room.R[g], load[0], load[1], load[2])
+    mx, my, mz = rotate(room.R[g], load[3], load[4], load[5])
+    for side in range(2):
+        i, c, sign = (0, body_pose, 1.0) if side == 0 else (1 + g, h, -1.0)
+        ax, ay, az = cross(at[0] - c[0], at[1] - c[1], at[2] - c[2], fx, fy, fz)
+        total[0], total[1], total[2], total[3], total[4], total[5] = fx, fy, fz, mx + ax, my + ay, mz + az
+        for k in range(6):
+            impulse[i, k] = sign * total[k] + (impulse[0, k] if side == 0 else 0.0)
+    for row in range(6):
+        load[row] /= dt
+    rx, ry, rz = at[0] - body_pose[0], at[1] - body_pose[1], at[2] - body_pose[2]
+    _velocity(room.R[g], room.twist, rx, ry, rz, room.ask)
+    for row in range(6):
+        room.ask[row] -= room.drift[g, row]
+    _follow(g, room.error[g], room.ask, load, grasps.held, grasps.slid, grasps.slides[g, 0], grasps.slides[g, 1], dt)

@@ -35,31 +35,27 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
 
     ``gravity`` (3,) holds unless the body has its own. Raises `GeometryError`.
     """
-    inertial_block = element.has("mass")
     offset = pose_matrix(*element.pose("inertial offset")) if element.has("inertial offset") else None
     shapes = colliders(element, context, np.eye(4) if offset is None else offset)
     looks = visual(element, context, shaders)
     tissue = tissue_of(element, context, looks, shapes)
     margin = element.number("collision margin")
-    own = np.array([element.number(f"inertia.{k}") for k in ("ix", "iy", "iz")]) if element.has("inertia") else None
+    has_mass = element.has("mass")  # without it, no inertial key has an effect
+    offset, moments = (offset, _moments(element)) if has_mass else (None, None)
     if tissue is not None:
-        mass = element.number("mass") if inertial_block else float(tissue.cell_masses.sum())
+        mass = element.number("mass") if has_mass else float(tissue.cell_masses.sum())
         tissue = tissue.with_mass(mass)
         check_density(element, tissue)
-        T_body_inertial, inertia = inertial_of(tissue, mass, offset if inertial_block else None)
-        inertia = own if inertial_block and own is not None else inertia
+        T_body_inertial, estimated = inertial_of(tissue, mass, offset)
+        inertia = estimated if moments is None else moments
         shapes = ()
     else:
-        if not inertial_block:
+        if not has_mass:
             _warn_no_mass(element, context)
-        T_body_inertial = offset if offset is not None and inertial_block else _estimated_offset(shapes)
         mass = element.number("mass")
-        if inertial_block and own is not None:
-            inertia = own
-        else:
-            size = estimate_size(shapes, T_body_inertial, margin)
-            inertia = np.zeros(3) if size is None else box_inertia(mass, size)
-    own_gravity = inertial_block and element.has("gravity")
+        T_body_inertial = _estimated_offset(shapes) if offset is None else offset
+        inertia = _box_moments(shapes, T_body_inertial, margin, mass) if moments is None else moments
+    own_gravity = has_mass and element.has("gravity")
     return partial(
         Body,
         mass=mass,
@@ -80,9 +76,20 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
         publish_joint_names=element.flag("publish joint names"),
         publish_joint_positions=element.flag("publish joint positions"),
         needle=element.value("ligature needle"),
-        inertia_estimated=not (inertial_block and own is not None),
+        inertia_estimated=moments is None,
         tissue=tissue,
     )
+
+
+def _moments(element: Element) -> Array | None:
+    """Principal moments (3,) of a body that gives them."""
+    return np.array([element.number(f"inertia.{k}") for k in ("ix", "iy", "iz")]) if element.has("inertia") else None
+
+
+def _box_moments(shapes: tuple[Collider, ...], T_body_inertial: Array, margin: float, mass: float) -> Array:
+    """Principal moments (3,) of a body that gives none: of a box of the size of its shapes."""
+    size = estimate_size(shapes, T_body_inertial, margin)
+    return np.zeros(3) if size is None else box_inertia(mass, size)
 
 
 def _estimated_offset(shapes: tuple[Collider, ...]) -> Array:

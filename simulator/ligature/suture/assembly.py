@@ -6,6 +6,7 @@ World axes, SI units.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +21,60 @@ LOCKED = 1e6
 """Stiffness in N m/rad of a locked joint axis."""
 
 
-def chain_nodes(
-    description: RodDescription, partners: Sequence[Partner], node_of: dict[int, int], own: slice, total: int, dt: float
-) -> layout.Nodes:
-    """All ``total`` nodes: the elements at rows ``own``, ``partners`` at those that ``node_of`` has for their bodies.
+@dataclass(frozen=True)
+class Numbering:
+    """The numbers of a rod's nodes: the body at its head, the elements, the body at its tail, then all other bodies.
 
-    ``dt`` is the length of a tick in seconds.
+    Attributes
+    ----------
+    head, tail
+        Attachments at the first and the last element, whose bodies are nodes of the chain.
+    others
+        All other attachments.
+    first
+        Node of the first element.
+    chain, total
+        Number of nodes of the chain, and of all.
+    node_of
+        Node of each body that the rod may meet.
     """
-    nodes = layout.nodes(total)
+
+    head: Attachment | None
+    tail: Attachment | None
+    others: tuple[Attachment, ...]
+    first: int
+    chain: int
+    total: int
+    node_of: dict[int, int]
+
+    @classmethod
+    def of(cls, description: RodDescription, partners: Sequence[Partner]) -> Numbering:
+        """Number the nodes of a rod among ``partners``; raises ValueError if it is attached to another body."""
+        known = {partner.body for partner in partners}
+        for attachment in description.attachments:
+            if attachment.body not in known:
+                raise ValueError(
+                    f"rod '{description.name}' is attached to body {attachment.body}, which is missing in its partners"
+                )
+        n = len(description.mass)
+        head = next((t for t in description.attachments if t.element == 0), None)
+        at_tail = (t for t in description.attachments if t.element == n - 1 and (head is None or t.body != head.body))
+        tail = next(at_tail, None)
+        first = 1 if head else 0
+        chain = first + n + (1 if tail else 0)
+        node_of = {attachment.body: node for attachment, node in ((head, 0), (tail, chain - 1)) if attachment}
+        apart = [partner.body for partner in partners if partner.body not in node_of]
+        node_of |= {body: chain + k for k, body in enumerate(apart)}
+        others = tuple(t for t in description.attachments if t is not head and t is not tail)
+        return cls(head, tail, others, first, chain, chain + len(apart), node_of)
+
+
+def chain_nodes(
+    description: RodDescription, partners: Sequence[Partner], numbers: Numbering, dt: float
+) -> layout.Nodes:
+    """All nodes: the elements, and the bodies of ``partners``; ``dt`` is the length of a tick in seconds."""
+    nodes = layout.nodes(numbers.total)
+    own = slice(numbers.first, numbers.first + len(description.mass))
     nodes.mass[own], nodes.inertia[own] = description.mass, description.inertia
     nodes.gravity[own], nodes.radius[own] = description.gravity, description.radius
     nodes.friction[own], nodes.axis[own] = description.friction, description.ends
@@ -35,7 +82,7 @@ def chain_nodes(
     # Powers of numbers, not of arrays, have the same bits on every processor.
     nodes.keep[own] = [[share**dt for share in row] for row in left.tolist()]
     for partner in partners:
-        i = node_of[partner.body]
+        i = numbers.node_of[partner.body]
         nodes.fixed[i] = partner.fixed
         if not partner.fixed:
             nodes.mass[i], nodes.inertia[i], nodes.gravity[i] = (
@@ -65,16 +112,6 @@ def grasp_rows(pads: JawPads) -> list[Array]:
         row[0, 1], row[1, 1], row[2, 0, 0] = point, pads.normal, pads.limit / len(pads.points)
         rows.append(row)
     return rows
-
-
-def chain_ends(description: RodDescription) -> tuple[Attachment | None, Attachment | None, list[Attachment]]:
-    """The attachments whose bodies become the chain's first and last node, and the others."""
-    head = next((t for t in description.attachments if t.element == 0), None)
-    last = len(description.mass) - 1
-    tail = next(
-        (t for t in description.attachments if t.element == last and (head is None or t.body != head.body)), None
-    )
-    return head, tail, [t for t in description.attachments if t is not head and t is not tail]
 
 
 def chain_joints(description: RodDescription, head: Attachment | None, tail: Attachment | None) -> layout.Joints:

@@ -16,7 +16,7 @@ from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, quat
 from ligature.model.poses import compose_rows
 from ligature.model.subsystem import kept, put_back
 from ligature.suture import layout
-from ligature.suture.assembly import chain_ends, chain_joints, chain_nodes, grasp_rows, point_constraint
+from ligature.suture.assembly import Numbering, chain_joints, chain_nodes, grasp_rows, point_constraint
 from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import Attachment, RodDescription
@@ -81,25 +81,16 @@ class Rod:
         self.constraints: list[PointConstraint] = []
         self._pads: tuple[JawPads, ...] = ()
         n = len(description.mass)
-        known = {partner.body: partner for partner in partners}
-        for attachment in description.attachments:
-            if attachment.body not in known:
-                raise ValueError(
-                    f"rod '{description.name}' is attached to body {attachment.body}, which is missing in its partners"
-                )
-        head, tail, others = chain_ends(description)
-        self._first = 1 if head else 0
+        numbers = Numbering.of(description, partners)
+        self._first, self._chain, self._total, self.node_of = (
+            numbers.first, numbers.chain, numbers.total, numbers.node_of,
+        )  # fmt: skip
         self._own = slice(self._first, self._first + n)
-        self._chain = n + self._first + (1 if tail else 0)
-        ends = {attachment.body: node for attachment, node in ((head, 0), (tail, self._chain - 1)) if attachment}
-        rest = [partner for partner in partners if partner.body not in ends]
-        self.node_of = {**ends, **{p.body: self._chain + k for k, p in enumerate(rest)}}
-        self._total = self._chain + len(rest)
-        self.joints = chain_joints(description, head, tail)
+        self.joints = chain_joints(description, numbers.head, numbers.tail)
         self._unbent = self.joints.rest.copy()
-        self._nodes = chain_nodes(description, self.partners, self.node_of, self._own, self._total, dt)
+        self._nodes = chain_nodes(description, self.partners, numbers, dt)
         self.shapes = shapes or layout.no_shapes(n)
-        capacity = 256 + 8 * n + 3 * len(others)
+        capacity = 256 + 8 * n + 3 * len(numbers.others)
         self._buffers = self._touches = tuple(layout.touches(capacity) for _ in range(3))
         self._touch_tables = np.array([table_of(touches) for touches in self._buffers])
         self._order = np.arange(3)
@@ -111,7 +102,7 @@ class Rod:
             1.0 / (INDENTATION * float(description.radius.min())), MAX_SPEED, dt,
         )  # fmt: skip
         self._table = table_of(self._arrays)
-        self._permanent = [point_constraint(description, attachment) for attachment in others]
+        self._permanent = [point_constraint(description, attachment) for attachment in numbers.others]
         self._mobile = np.full(self._total, -1)
         for partner in partners:
             if partner.mass > 0.0:

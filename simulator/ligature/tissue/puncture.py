@@ -112,8 +112,7 @@ class NeedleInTissue:
         if self._held.tip[0] == states.OUTSIDE:
             self._look_for_surface()
         left, fate = couple(self._interface.table, self.table, dt)
-        if fate < 0 or not math.isfinite(self.arrays.delta.sum()):
-            raise FloatingPointError("the equations of the needle in tissue have no finite solution")
+        self._check(fate >= 0)
         self._conclude(left, fate > 0)
 
     def begin(
@@ -142,7 +141,11 @@ class NeedleInTissue:
         if self._held.tip[0] == states.OUTSIDE:
             self._look_for_surface()
         self._left, self._count = begin_coupling(self._interface.table, self.table, dt)
-        if self._count < 0 or not math.isfinite(self.arrays.delta.sum()):
+        self._check(self._count >= 0)
+
+    def _check(self, solved: bool) -> None:
+        """Raise FloatingPointError unless the equations were ``solved``, with a finite motion."""
+        if not (solved and math.isfinite(self.arrays.delta.sum())):
             raise FloatingPointError("the equations of the needle in tissue have no finite solution")
 
     def end(self, delta: Array) -> Array:

@@ -229,37 +229,18 @@ def _gather(points: Points, strand: Strand, line: Array, fraction: float) -> Non
         start[0], start[1], start[2] = line[s, 0] + part * ex, line[s, 1] + part * ey, line[s, 2] + part * ez
         y = points.at[i]
         tx, ty, tz = _ring_axis(line, s, part, start[0] - y[0], start[1] - y[1], start[2] - y[2])
-        # As the thread sees it: all of its nodes move together.
-        for a in range(3):
-            for b in range(3):
-                W[a, b] = 0.0
-                for q in range(rows.filled[0]):
-                    W[a, b] += points.C[i, rows.node[q], a, b]
-        for a in range(3):
-            for b in range(a):
-                mean = 0.5 * (W[a, b] + W[b, a])
-                W[a, b], W[b, a] = mean, mean
-        x, y, z = carried(points, i, fraction)
-        for b in range(3):
-            f = points.mean[i, b]
-            x, y, z = x - W[0, b] * f, y - W[1, b] * f, z - W[2, b] * f
-        for u in range(points.filled[0]):
-            j = points.used[u]
-            if held.engaged[j]:
-                continue
-            C = points.C[i, j]
-            for b in range(3):
-                f = points.force[j, b] - points.mean[j, b]
-                x, y, z = x + C[0, b] * f, y + C[1, b] * f, z + C[2, b] * f
+        _sum_compliance(points, rows, i, W)
+        x, y, z = _place_without(points, held, i, W, fraction)
         nx, ny, nz = start[0] - x - held.torn[i, 0], start[1] - y - held.torn[i, 1], start[2] - z - held.torn[i, 2]
         along = nx * tx + ny * ty + nz * tz
         nx, ny, nz = nx - along * tx, ny - along * ty, nz - along * tz
         across = math.sqrt(nx * nx + ny * ny + nz * nz)
-        size = across
-        if not across > 1e-9:
+        if across > 1e-9:
+            nx, ny, nz = nx / across, ny / across, nz / across
+        else:
             nx, ny, nz = _beside(tx, ty, tz)
             size = math.sqrt(nx * nx + ny * ny + nz * nz)
-        nx, ny, nz = nx / size, ny / size, nz / size
+            nx, ny, nz = nx / size, ny / size, nz / size
         E[0, 0], E[0, 1], E[0, 2] = tx, ty, tz
         E[1, 0], E[1, 1], E[1, 2] = nx, ny, nz
         E[2, 0], E[2, 1], E[2, 2] = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
@@ -275,6 +256,38 @@ def _gather(points: Points, strand: Strand, line: Array, fraction: float) -> Non
         rows.limit[r, 0] = strand.friction[0] * points.friction[i] * held.share[i]
         # The first node of a path stands for no length while the needle has the others; it tears no sooner than they.
         rows.limit[r, 1] = points.strength[i] * max(held.share[i], LEAST_SHARE)
+
+
+@inlined
+def _sum_compliance(points: Points, rows: Rows, i: int, W: Array) -> None:
+    """Compliance ``W`` (3, 3) of node ``i`` as the thread sees it: all of its nodes move together."""
+    for a in range(3):
+        for b in range(3):
+            W[a, b] = 0.0
+            for q in range(rows.filled[0]):
+                W[a, b] += points.C[i, rows.node[q], a, b]
+    for a in range(3):
+        for b in range(a):
+            mean = 0.5 * (W[a, b] + W[b, a])
+            W[a, b], W[b, a] = mean, mean
+
+
+@inlined
+def _place_without(points: Points, held: Held, i: int, W: Array, fraction: float) -> tuple[float, float, float]:
+    """Where node ``i`` would be without the force of the thread, and with the present ones of all else."""
+    x, y, z = carried(points, i, fraction)
+    for b in range(3):
+        f = points.mean[i, b]
+        x, y, z = x - W[0, b] * f, y - W[1, b] * f, z - W[2, b] * f
+    for u in range(points.filled[0]):
+        j = points.used[u]
+        if held.engaged[j]:
+            continue
+        C = points.C[i, j]
+        for b in range(3):
+            f = points.force[j, b] - points.mean[j, b]
+            x, y, z = x + C[0, b] * f, y + C[1, b] * f, z + C[2, b] * f
+    return x, y, z
 
 
 @inlined
