@@ -32,6 +32,9 @@ Roots = Annotated[
     list[Path] | None, typer.Option("--root", help="Additional folder that scene files may be read from.")
 ]  # noqa: UP045
 
+UpdateRate = Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)]
+Speed = Annotated[float, typer.Option("-s", "--speed", help="Simulated time over wall time.", min=0.001)]
+
 Rate = Annotated[
     Optional[float],  # noqa: UP045
     typer.Option("--rate", help="For a dataset: samples per simulated second, 10 by default.", min=0.1, max=1000),

@@ -19,6 +19,8 @@ from ligature.cli.arguments import (
     Rate,
     Roots,
     Size,
+    Speed,
+    UpdateRate,
     five_numbers,
     indices,
     launch_files,
@@ -51,8 +53,8 @@ def run(
     launch: Launch,
     models: Models = None,
     root: Roots = None,
-    rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
-    speed: Annotated[float, typer.Option("-s", "--speed", help="Simulated time over wall time.", min=0.001)] = 1.0,
+    rate: UpdateRate = 1000.0,
+    speed: Speed = 1.0,
     namespace: Annotated[str, typer.Option("--ns", help="Prefix of every namespace.")] = "",
     min_hz: Annotated[int | None, typer.Option("--min-hz", help="Publishing rate without commands.", min=1)] = None,  # noqa: UP045
     max_hz: Annotated[int | None, typer.Option("--max-hz", help="Publishing rate with commands.", min=1)] = None,  # noqa: UP045
@@ -130,8 +132,8 @@ def cockpit(
     models: Models = None,
     root: Roots = None,
     at: CockpitAddress = None,
-    rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 1000.0,
-    speed: Annotated[float, typer.Option("-s", "--speed", help="Simulated time over wall time.", min=0.001)] = 1.0,
+    rate: UpdateRate = 1000.0,
+    speed: Speed = 1.0,
     devices: Devices = None,
     allow_plugins: AllowPlugins = False,
 ) -> None:
@@ -172,7 +174,7 @@ def bench(
     launch: Launch,
     models: Models = None,
     seconds: Annotated[float, typer.Option(help="Wall-clock seconds to measure.", min=0.1)] = 5.0,
-    rate: Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)] = 200.0,
+    rate: UpdateRate = 200.0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     root: Roots = None,
 ) -> None:

@@ -20,20 +20,47 @@ if TYPE_CHECKING:
 class RunOptions:
     """Options of a run.
 
-    ``models`` are indices of the launch file (None: all), ``rate`` the updates per simulated second, ``speed``
-    simulated over wall time, ``bus`` the name of the shared memory block, ``min_hz`` and ``max_hz`` replace the
-    publishing rates of all objects, ``names`` is the name policy, ``arms`` are arms as `arm_entry` reads them instead
-    of those of the scene, ``src_crtk`` whether arms also have the names of the suturing challenge's CRTK node,
-    ``cameras`` whether pictures are published (None: of those cameras for which the scene asks for it), ``window``
-    whether one is shown, ``camera_windows`` whether there is one for each camera, ``task`` is a task that is judged,
-    ``record`` a file that all commands are written to, ``cockpit`` is the address of the web page (empty: none),
-    ``ros`` whether ROS is served, ``notes`` are lines for the user at the start, ``devices`` are indices of the input
-    devices whose proxies are there, ``soft`` bodies that are soft tissue, ``only`` the names of the arms that are
-    there (empty: all), ``masters`` whether master arms are, ``base_frames`` the arm in the frame of whose tip the
-    others give their poses (empty: each in its base). ``haptic_rate`` in Hz (0: that of the device), ``haptic_fixed``
-    (one of its periods goes by between two forces, however long it was) and ``haptic_forces`` (None: as teleoperation
-    has them) are left to teleoperation as parameters. ``allow_plugins``: the plug-ins that the scene's files name are
-    run.
+    Attributes
+    ----------
+    scene
+        Launch file, model file, or name of a bundled scene.
+    models, files, roots, prefix, devices, soft
+        What is loaded of it, as `ligature.load` takes them.
+    rate, speed
+        Updates per simulated second, and simulated over wall time.
+    bus
+        Name of the shared memory block.
+    min_hz, max_hz
+        Replace the publishing rates of all objects.
+    names
+        The name policy.
+    arms
+        Arms, as `arm_entry` reads them, instead of those of the scene.
+    only, masters
+        Names of the arms that are there (empty: all), and whether master arms are.
+    base_frames
+        The arm in the frame of whose tip the others give their poses; empty: each in its base.
+    src_crtk
+        Whether arms also have the names of the suturing challenge's CRTK node.
+    cameras
+        Whether pictures are published; None: of those cameras for which the scene asks for it.
+    window, camera_windows
+        Whether a window is shown, and one for each camera.
+    task
+        A task that is judged.
+    record
+        A file that all commands are written to.
+    cockpit
+        Address of the web page; empty: none.
+    ros
+        Whether ROS is served.
+    notes
+        Lines for the user at the start.
+    haptic_rate, haptic_fixed, haptic_forces
+        Parameters for teleoperation: a rate in Hz (0: that of the device), whether one of its periods goes by between
+        two forces, however long it was, and whether there are forces (None: as teleoperation has them).
+    allow_plugins
+        Whether the plug-ins that the scene's files name are run.
     """
 
     scene: str
