@@ -7,7 +7,6 @@ cloud is the body with the identifier ``header.frame_id``, the world where that 
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -21,7 +20,7 @@ from ligature.model.clouds import LARGEST, Cloud
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Scene
 from ligature.ros.intake import allow_bytes
-from ligature.ros.parameters import PERIOD, server_parameters
+from ligature.ros.parameters import Server, look_up
 
 PARAMETER = "point_cloud_topics"
 MOST_TOPICS = 32
@@ -45,17 +44,14 @@ class Clouds:
         self._subscribers: dict[str, list[Any]] = {}
         self._points: dict[str, tuple[int, NDArray[np.float64], NDArray[np.uint8]]] = {}
         self._sizes: dict[str, int] = {}
-        self._next = 0.0
+        self._server = Server()
 
     def poll(self) -> None:
         """Follow the list of topics, every two seconds."""
-        now = time.monotonic()
-        if now < self._next:
+        tree = self._server.read()
+        if tree is None:
             return
-        self._next = now + PERIOD
-        found = server_parameters()
-        for part in f"{self._scene.world.topic}/{PARAMETER}".strip("/").split("/"):
-            found = found.get(part) if isinstance(found, dict) else None
+        found = look_up(tree, f"{self._scene.world.topic}/{PARAMETER}")
         wanted = [t for t in found if isinstance(t, str) and t][:MOST_TOPICS] if isinstance(found, list) else []
         for topic in set(self._subscribers) - set(wanted):
             for subscriber in self._subscribers.pop(topic):

@@ -130,6 +130,24 @@ def sensor_with(values: Values) -> dict[str, Any]:
     }
 
 
+class Server:
+    """The parameter server, which is read every two seconds."""
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def read(self) -> Any:
+        """The tree of all parameters when it is due, else None; from the server itself.
+
+        ``rospy.get_param("/")`` answers from a cache that holds a single entry once the node has logged a warning.
+        """
+        now = time.monotonic()
+        if now < self._next:
+            return None
+        self._next = now + PERIOD
+        return rosgraph.Master(rospy.get_name()).getParam("/")
+
+
 class Parameters:
     """Writes the parameters of a scene at start-up, and again when the server has lost them.
 
@@ -147,19 +165,17 @@ class Parameters:
             self._add(camera.identity.topic, camera_parameters(camera), ("camera", camera.index))
         for light in scene.lights:
             self._add(light.identity.topic, light_parameters(light), ("light", light.index))
-        self._next = 0.0
+        self._server = Server()
         for name, value in self._values.items():
             rospy.set_param(name, value)
 
     def poll(self) -> None:
         """Every two seconds: write what a restarted master has lost, follow new parents."""
-        now = time.monotonic()
-        if now < self._next:
+        tree = self._server.read()
+        if tree is None:
             return
-        self._next = now + PERIOD
-        tree = server_parameters()
         for name, value in self._values.items():
-            found = _look_up(tree, name)
+            found = look_up(tree, name)
             if found is None:
                 rospy.set_param(name, value)
             elif found != value:
@@ -190,7 +206,7 @@ class Follower:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._next = 0.0
+        self._server = Server()
         self._reported: set[str] = set()
         self.cameras = {camera.index: camera for camera in scene.cameras}
         self.lights = {light.index: light_with(light, {}) for light in scene.lights}
@@ -198,11 +214,9 @@ class Follower:
 
     def poll(self) -> None:
         """Every two seconds: read what users have set."""
-        now = time.monotonic()
-        if now < self._next:
+        tree = self._server.read()
+        if tree is None:
             return
-        self._next = now + PERIOD
-        tree = server_parameters()
         for camera in self._scene.cameras:
             values = _below(tree, camera.identity.topic, camera_parameters(camera))
             self._read(camera, values, partial(camera_with, camera), self.cameras)
@@ -221,21 +235,13 @@ class Follower:
             self._reported.add(text)
 
 
-def server_parameters() -> Any:
-    """The tree of all parameters, from the server itself.
-
-    ``rospy.get_param("/")`` answers from a cache that holds a single entry once the node has logged a warning.
-    """
-    return rosgraph.Master(rospy.get_name()).getParam("/")
-
-
 def _below(tree: Any, topic: str, names: Values) -> dict[str, Any]:
     """The parameters of ``names`` that the server has below ``topic``."""
-    found = {name: _look_up(tree, f"{topic}/{name}") for name in names}
+    found = {name: look_up(tree, f"{topic}/{name}") for name in names}
     return {name: value for name, value in found.items() if value is not None}
 
 
-def _look_up(tree: Any, name: str) -> Any:
+def look_up(tree: Any, name: str) -> Any:
     """The value of a parameter in the tree of all; None when it is missing."""
     for part in name.strip("/").split("/"):
         if not isinstance(tree, dict):
