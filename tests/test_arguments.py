@@ -14,6 +14,8 @@ import pytest
 from ligature.model.frames import pose7_matrix
 from ligature.render.context import RenderUnavailable, create_context
 
+from tests.opengl import opengl
+
 MODEL = """
 bodies: [Needle, Table]
 cameras: [eye]
@@ -119,10 +121,8 @@ def _draw(found: Any) -> None:
 
 
 def test_a_child_that_was_forked_after_a_picture_reports_that_it_cannot_draw() -> None:
-    try:
+    with opengl():
         create_context().release()
-    except RenderUnavailable:
-        pytest.skip("no OpenGL here")
     fork = multiprocessing.get_context("fork")
     found = fork.Queue()
     child = fork.Process(target=_draw, args=(found,))

@@ -14,10 +14,10 @@ import pytest
 import typer
 from ligature.cli import ambf_simulator
 from ligature.cli.main import app
-from ligature.render.context import RenderUnavailable
 
 from tests.conftest import ROOT
 from tests.docs.pages import ALL, PAGES, blocks
+from tests.opengl import opengl
 
 BIN = Path(sys.executable).parent
 ROS_PAGES = {"clients.md", "rostest.md"}
@@ -46,10 +46,8 @@ def test_python_of_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.M
             _run(block.text, tmp_path)
         elif block.language == "python":
             code = compile("\n" * (block.line - 1) + block.text, str(page), "exec")
-            try:
+            with opengl():
                 exec(code, namespace)
-            except RenderUnavailable as reason:
-                pytest.skip(str(reason))
 
 
 def _run(text: str, folder: Path) -> None:

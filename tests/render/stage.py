@@ -12,13 +12,14 @@ from pathlib import Path
 
 import ligature
 import numpy as np
-import pytest
 from ligature import Simulation
 from ligature.model.shapes import Box, Sphere
-from ligature.render import Frame, Renderer, RenderUnavailable, view_of
+from ligature.render import Frame, Renderer, view_of
 from ligature.render.context import create_context, draws_on_processor
 from ligature.render.geometry import Triangles, box, of_shape
 from PIL import Image
+
+from tests.opengl import opengl
 
 GOLDEN = Path(__file__).parent / "golden"
 CAMERA = (
@@ -83,10 +84,8 @@ class Stage:
     def renderer(self, samples: int | None = None) -> tuple[Renderer, Simulation]:
         """The scene, loaded, and what draws it; skips where there is no OpenGL."""
         simulation = Simulation(ligature.load(self.write()))
-        try:
+        with opengl():
             return Renderer(simulation.scene, samples), simulation
-        except RenderUnavailable as error:
-            pytest.skip(str(error))
 
     def draw(self, samples: int | None = None) -> Frame:
         """Its picture."""

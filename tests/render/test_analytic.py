@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from ligature import Simulation
 from ligature.model.frames import pose_matrix
-from ligature.render import CameraView, Renderer, RenderUnavailable, view_of
+from ligature.render import CameraView, Renderer, view_of
+
+from tests.opengl import opengl
 
 RADIUS, HEIGHT = 0.21, 0.8
 SHAPES = {
@@ -101,10 +103,8 @@ def test_depth_ids_and_normals_are_those_of_the_shape(tmp_path: Path, kind: str,
         "field view angle: 0.8, clipping plane: {near: 0.05, far: 10}, publish image resolution: {width: 96, height: 72}}\n"
     )
     simulation = Simulation(ligature.load(path))
-    try:
+    with opengl():
         renderer = Renderer(simulation.scene, samples)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0])
     frame = renderer.render(simulation.state, view)
     depth, least, normal, facing = met(kind, view.view @ pose_matrix(at, rpy), view)

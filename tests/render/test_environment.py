@@ -8,9 +8,10 @@ import ligature
 import numpy as np
 import pytest
 from ligature import Simulation
-from ligature.render import Renderer, RenderUnavailable, view_of
+from ligature.render import Renderer, view_of
 from PIL import Image
 
+from tests.opengl import opengl
 from tests.render.test_shaders import well_inside
 
 FACES = {"right": (200, 0, 0), "left": (0, 200, 0), "bottom": (0, 0, 200), "top": (200, 200, 0),
@@ -67,10 +68,8 @@ def drawn(folder: Path, body: str, shaders: tuple[str, str] | None = None, sky: 
         "world config: world.yaml\ncolor config: colors.yaml\ninput devices config: devices.yaml\nmultibody configs: [model.yaml]\n"
     )
     simulation = Simulation(ligature.load(folder / "launch.yaml"))
-    try:
+    with opengl():
         renderer = Renderer(simulation.scene, samples=0)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0])
     frame = renderer.render(simulation.state, view)
     assert renderer.problems == []

@@ -8,8 +8,10 @@ import ligature
 import numpy as np
 import pytest
 from ligature import Simulation
-from ligature.render import Renderer, RenderUnavailable, view_of
+from ligature.render import Renderer, view_of
 from ligature.render.target import saturated_share
+
+from tests.opengl import opengl
 
 SHADERS = Path(__file__).parent / "shaders"
 WALLS = (("x", 0, 1), ("x", 0, -1), ("y", 1, 1), ("y", 1, -1))
@@ -64,10 +66,8 @@ def test_a_cavity_lit_by_the_endoscope_alone_is_neither_white_nor_black(tmp_path
         path = tmp_path / f"m{seed}.yaml"
         path.write_text(cavity(np.random.default_rng(seed), shaders))
         simulation = Simulation(ligature.load(path))
-        try:
+        with opengl():
             renderer = Renderer(simulation.scene)
-        except RenderUnavailable as error:
-            pytest.skip(str(error))
         view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0])
         frame = renderer.render(simulation.state, view, ("rgb", "ids"))
         assert renderer.problems == []

@@ -18,13 +18,15 @@ import pytest
 from ligature.adf import Resolver
 from ligature.model.frames import axis_rotation, frame
 from ligature.model.shapes import Colour, ShaderFiles
-from ligature.render import LightKind, RenderUnavailable, legacy
+from ligature.render import LightKind, legacy
 from ligature.render.camera import perspective
 from ligature.render.context import create_context
 from ligature.render.geometry import Triangles
 from ligature.render.lights import HEADLIGHT, Lights, LightSettings
 from ligature.render.surface import Surface
 from ligature.render.textures import Textures
+
+from tests.opengl import opengl
 
 Array = np.ndarray
 COLOUR = Colour(
@@ -176,10 +178,8 @@ SETTINGS = {
 
 @pytest.fixture(scope="module")
 def context() -> Iterator[moderngl.Context]:
-    try:
+    with opengl():
         made = create_context()
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     yield made
     made.release()
 

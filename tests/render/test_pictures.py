@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from ligature import Simulation
 from ligature.model.frames import matrix_pose7, pose7_matrix
-from ligature.render import CameraView, Frame, Renderer, RenderUnavailable, view_of
+from ligature.render import CameraView, Frame, Renderer, view_of
 from ligature.render.camera import perspective
 
+from tests.opengl import opengl
 from tests.render.stage import assert_looks_like
 from tests.wound import pass_through_the_wound
 
@@ -38,10 +39,8 @@ def posed(launch: Path, models: tuple[int, ...] | None, arms: dict[str, list[flo
 
 
 def renderer_of(simulation: Simulation) -> Renderer:
-    try:
+    with opengl():
         return Renderer(simulation.scene)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
 
 
 def view(simulation: Simulation, camera: int, size: tuple[int, int]) -> CameraView:

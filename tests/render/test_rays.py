@@ -14,12 +14,14 @@ from ligature import Simulation
 from ligature.adf import AdfError
 from ligature.model.shapes import ShaderFiles
 from ligature.model.voxels import VolumeForm
-from ligature.render import CameraView, Frame, Renderer, RenderUnavailable, view_of
+from ligature.render import CameraView, Frame, Renderer, view_of
 from ligature.render.rays import volume_rays
 from ligature.render.visuals import VisualLoader
 from PIL import Image
 from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial.transform import Rotation
+
+from tests.opengl import opengl
 
 N, EDGE, RADIUS = 40, 0.08, 0.03
 """Voxels along an edge, and metres, of the box; radius of the ball in it."""
@@ -74,10 +76,8 @@ class Stage:
         assert not [d for d in loaded.diagnostics if d.severity.name in ("ERROR", "WARNING")]
         self.sim = Simulation(loaded, allow_plugins=True)  # so that voxels are of the state
         self.scene = self.sim.scene
-        try:
+        with opengl():
             self.renderer = Renderer(self.scene)
-        except RenderUnavailable as error:
-            pytest.skip(str(error))
         self.state = self.sim.state.copy()
         found = {body.identity.name: body for body in self.scene.bodies}
         self.cloud, self.plate = found["Cloud"].index + 1, found["Plate"].index + 1

@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from ligature import Simulation
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
-from ligature.render import Renderer, RenderUnavailable, view_of
+from ligature.render import Renderer, view_of
 from ligature.render.tissue import TissueSurface, tissue_surfaces
 from ligature.render.visuals import VisualLoader
+
+from tests.opengl import opengl
 
 FEW = (120, 90)
 """Pixels of pictures that are compared with rays."""
@@ -137,10 +139,8 @@ def test_an_open_wound_is_a_closed_surface_with_walls_and_a_floor(forms):
 def drawn(forms):
     def make(name: str = "box", size: tuple[int, int] | None = None):
         scene = forms[name]
-        try:
+        with opengl():
             renderer = Renderer(scene)
-        except RenderUnavailable as error:
-            pytest.skip(str(error))
         state = Simulation(scene).state.copy()
         view = view_of(scene.cameras[0], state["camera_world"][0, 0], size)
         return renderer, state, view, surface_of(scene)
@@ -267,10 +267,8 @@ def test_two_bodies_of_one_shape_are_drawn_each_where_it_is(tmp_path: Path):
     other = PAD.format(shape=BOX, cell=0.006, slits="").replace("Pad: {name: Pad", "Other: {name: Other")
     (tmp_path / "m.yaml").write_text(text + other.replace("x: 0.004, y: 0.002", "x: 0.004, y: 0.044"))
     simulation = Simulation(ligature.load(tmp_path / "m.yaml"))
-    try:
+    with opengl():
         renderer = Renderer(simulation.scene)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0])
     before = renderer.render(simulation.state, view, ("depth", "ids"))
     assert {1, 2, 3} <= set(np.unique(before.ids).tolist())
@@ -291,10 +289,8 @@ def test_a_soft_body_that_fell_is_drawn_where_its_nodes_are(tmp_path):
     lump = "Lump: {name: lump, mesh: lump.obj, mass: 0.03, config: {kMT: 0.003}}\n"
     (tmp_path / "m.yaml").write_text(head + lump)
     scene = ligature.load(tmp_path / "m.yaml")
-    try:
+    with opengl():
         renderer = Renderer(scene)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     simulation = Simulation(scene)
     simulation.step(800)
     state = simulation.state.copy()

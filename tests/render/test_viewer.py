@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,21 +16,14 @@ from ligature.bus.pacing import Throttle
 from ligature.model.commands import BodyCommand, PlaceCommand, Release, Reset
 from ligature.model.frames import axis_rotation, frame, inverse, matrix_pose7, pose7_matrix
 from ligature.model.mounted import camera_frame
-from ligature.render import RenderUnavailable, view_of
+from ligature.render import view_of
 from ligature.render.controls import Controls
 from ligature.render.viewer import Figures, Viewer
 
+from tests.opengl import opengl
+
 SMALL = Path(__file__).resolve().parents[2] / "scenes" / "suturing_small" / "launch.yaml"
 SIZE = (320, 200)
-
-
-@contextmanager
-def opengl() -> Iterator[None]:
-    """Skips the test where the machine has no OpenGL."""
-    try:
-        yield
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="module")

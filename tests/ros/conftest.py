@@ -220,6 +220,9 @@ BODY CameraFrame:
 """
 
 
+ARMS = ("PSM1", "PSM2", "ECM", "MTML", "MTMR")
+
+
 @pytest.fixture(scope="session")
 def arms_scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A launch file with the arms of the small scene and nothing that they could touch."""
@@ -231,6 +234,28 @@ def arms_scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     launch = SMALL.read_text().partition("multibody configs")[0]
     (folder / "launch.yaml").write_text(launch + "multibody configs: [camera.yaml, psm1.yaml, psm2.yaml]\n")
     return folder / "launch.yaml"
+
+
+@pytest.fixture(scope="module")
+def simulator(start: Callable[..., Program], arms_scene: Path) -> Program:
+    """A simulator of `arms_scene` that runs."""
+    program = start(BIN / "ligature", "run", arms_scene, "-p", "500", "--no-cameras")
+    program.wait_for("first state published")
+    return program
+
+
+@pytest.fixture(scope="module")
+def arms(simulator: Program, node: Any) -> Iterator[dict[str, Any]]:
+    """A connected client for each of its arms."""
+    from tests.ros import crtk
+
+    kinds = {"PSM": crtk.Psm, "ECM": crtk.Arm, "MTM": crtk.Mtm}
+    clients = {name: kinds[name[:3]](node, name) for name in ARMS}
+    for client in clients.values():
+        client.check_connections(10.0)
+    yield clients
+    for client in clients.values():
+        client.close()
 
 
 @pytest.fixture

@@ -4,45 +4,23 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.ros.conftest import BIN
+from tests.ros.conftest import ARMS
 from tests.ros.test_client_scripts import on_all
 from tests.waiting import stays, steady, until
 
 pytestmark = pytest.mark.ros
 
-ARMS = ("PSM1", "PSM2", "ECM", "MTML", "MTMR")
 JOINTS = {
     "PSM": ["yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw"],
     "ECM": ["yaw", "pitch", "insertion", "roll"],
     "MTM": ["outer_yaw", "shoulder_pitch", "elbow_pitch", "wrist_platform", "wrist_pitch", "wrist_yaw", "wrist_roll"],
 }
-
-
-@pytest.fixture(scope="module")
-def simulator(start: Callable[..., Any], arms_scene: Path) -> Any:
-    program = start(BIN / "ligature", "run", arms_scene, "-p", "500", "--no-cameras")
-    program.wait_for("first state published")
-    return program
-
-
-@pytest.fixture(scope="module")
-def arms(simulator: Any, node: Any) -> Iterator[dict[str, Any]]:
-    from tests.ros import crtk
-
-    kinds = {"PSM": crtk.Psm, "ECM": crtk.Arm, "MTM": crtk.Mtm}
-    clients = {name: kinds[name[:3]](node, name) for name in ARMS}
-    for client in clients.values():
-        client.check_connections(10.0)
-    yield clients
-    for client in clients.values():
-        client.close()
 
 
 def at_home(client: Any) -> Any:

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 from ligature.model.frames import inverse, pose7_matrix
-from ligature.render.context import RenderUnavailable, create_context
+from ligature.render.context import create_context
 from PIL import Image as Pixels
 
+from tests.opengl import opengl
 from tests.ros.conftest import BIN, Program
 from tests.waiting import stays, until
 
@@ -56,10 +57,8 @@ SCENE = (
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    try:
+    with opengl():
         create_context().release()
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     path = tmp_path_factory.mktemp("cameras") / "scene.yaml"
     path.write_text(SCENE)
     return path

@@ -7,44 +7,21 @@ waits. All arms run theirs at the same time. Whoever has the packages runs them 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.ros.conftest import BIN
+from tests.ros.conftest import ARMS
 from tests.waiting import steady, until
 
 pytestmark = pytest.mark.ros
 
-ARMS = ("PSM1", "PSM2", "ECM", "MTML", "MTMR")
 CONNECTIONS = 5.0
 SETTLED = (2e-4, 2e-3)
 """Metres and radians within which an arm without load stands at its goal."""
-
-
-@pytest.fixture(scope="module")
-def simulator(start: Callable[..., Any], arms_scene: Path) -> Any:
-    program = start(BIN / "ligature", "run", arms_scene, "-p", "500", "--no-cameras")
-    program.wait_for("first state published")
-    return program
-
-
-@pytest.fixture(scope="module")
-def arms(simulator: Any, node: Any) -> Iterator[dict[str, Any]]:
-    """A connected client for every arm."""
-    from tests.ros import crtk
-
-    kinds = {"PSM": crtk.Psm, "ECM": crtk.Arm, "MTM": crtk.Mtm}
-    clients = {name: kinds[name[:3]](node, name) for name in ARMS}
-    for client in clients.values():
-        client.check_connections(CONNECTIONS)
-    yield clients
-    for client in clients.values():
-        client.close()
 
 
 def on_all(arms: dict[str, Any], run: Callable[[Any], None], names: tuple[str, ...] = ARMS) -> None:

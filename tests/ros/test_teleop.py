@@ -46,13 +46,6 @@ pairs:
 
 
 @pytest.fixture(scope="module")
-def simulator(start: Callable[..., Any], arms_scene: Path) -> Any:
-    program = start(BIN / "ligature", "run", arms_scene, "-p", "500", "--no-cameras")
-    program.wait_for("first state published")
-    return program
-
-
-@pytest.fixture(scope="module")
 def arms(simulator: Any, node: Any) -> Iterator[dict[str, Any]]:
     from tests.ros import crtk
 

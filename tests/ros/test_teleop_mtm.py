@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,13 +29,12 @@ VIEW_CONSOLE = np.diag([-1.0, -1.0, 1.0])
 
 
 @pytest.fixture(scope="module")
-def simulator(start: Callable[..., Any], arms_scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    program = start(BIN / "ligature", "run", arms_scene, "-p", "500", "--no-cameras")
-    program.wait_for("first state published")
+def simulator(simulator: Any, start: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The simulator of `arms_scene`, teleoperated."""
     file = tmp_path_factory.mktemp("teleop") / "teleop.yaml"
     file.write_text(CONFIG)
     start(BIN / "ligature", "teleop", file).wait_for("driving:")
-    return program
+    return simulator
 
 
 @pytest.fixture(scope="module")

@@ -15,9 +15,10 @@ from ligature.arms import ArmSet
 from ligature.model.frames import axis_rotation, frame, inverse
 from ligature.model.scene import Scene
 from ligature.model.state import new_state
-from ligature.render import Renderer, RenderUnavailable, view_of
+from ligature.render import Renderer, view_of
 from PIL import Image
 
+from tests.opengl import opengl
 from tests.wound import pass_through_the_wound
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -57,10 +58,8 @@ def test_repeats_bit_for_bit(launch: Path) -> None:
 
 def test_is_drawn_with_something_in_the_middle(launch: Path) -> None:
     simulation = run(launch, 1)
-    try:
+    with opengl():
         renderer = Renderer(simulation.scene)
-    except RenderUnavailable as error:
-        pytest.skip(str(error))
     view = view_of(simulation.scene.cameras[0], simulation.state["camera_world"][0, 0], (160, 120))
     frame = renderer.render(simulation.state, view)
     assert renderer.problems == []
