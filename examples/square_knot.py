@@ -11,37 +11,41 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import ligature
 import numpy as np
-from ligature.model.frames import axis_rotation, frame, inverse
+from ligature.model.frames import axis_rotation, frame
 from ligature.model.scene import Scene
-from ligature.model.shapes import Cylinder
-from ligature.robots.operating_state import Rejected
 from ligature.robots.poses import rotation_vector
-from ligature.robots.psm_arm import PsmArm
-from ligature.tasks.diagrams import Diagram
 from ligature.tasks.knots import HALF_KNOT, SquareKnotScore
-from ligature.tasks.throws import drawn_back, pose_of
+from ligature.tasks.throws import drawn_back
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+from looping import ASIDE, BEGIN, END, SHARES, THINNEST, between, drawn, radius_for  # noqa: E402
 from suture import Failure, Film  # noqa: E402
+from two_arms import (  # noqa: E402
+    BRISK,
+    CAREFUL,
+    DEEP,
+    FINGER_OPEN,
+    FINGERTIP,
+    LEFT,
+    OPEN,
+    RIGHT,
+    ROOT,
+    SHUT,
+    SLOW,
+    STREAM,
+    Missed,
+    TwoArms,
+)  # fmt: skip
 
 Array = np.ndarray
 
 SCENE = Path(__file__).resolve().parents[1] / "scenes" / "knot_tying" / "launch.yaml"
-RIGHT, LEFT = "PSM1", "PSM2"
-STREAM = 0.02
-"""Seconds between two set-points of a stream."""
-
-START = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
-OPEN, FINGER_OPEN, SHUT = 0.8, 0.4, -0.35
-DEEP, FINGERTIP, ROOT = 0.0075, 0.0094, 0.002
-"""Metres from the control point of a tool to where it holds the thread, to the end of its fingers, and to their root,
-where a loop lies."""
 
 TAKES = np.array([0.6, 0.3, -0.74])
 """Direction of the left tool: its shaft passes in front of the right jaws, and over the short end."""
@@ -49,8 +53,8 @@ TAKES = np.array([0.6, 0.3, -0.74])
 REACHES = np.array([-1.0, 0.0, 0.0])
 """Direction of the right tool: level and along the vessel, a finger that the thread is laid around."""
 
-HELD, TAIL, BESIDE_PADS = 5, 10, 4
-"""Elements from its end at which the long end is held, and the short one; how many pads may bend."""
+HELD, TAIL = 5, 10
+"""Elements from its end at which the long end is held, and the short one."""
 
 LEAN, STRETCHED, STANDS = -0.0215, 0.95, 0.007
 """Metres along the vessel where the short end is to stand; how far it is drawn out; the error that may stay."""
@@ -62,31 +66,11 @@ throw, as a knot gives way, and the vessel does not."""
 GAP, SNUG = 0.0155, 0.04
 """Metres between jaws and short end in which the left tool passes; newtons that keep the loop on the jaws."""
 
-FINGER, THINNEST = 0.0042, 0.011
-"""Radius of the jaws as the thread goes around them, and of the least circle that the left tool makes."""
-
-BEGIN, END = 60, 420
-"""Degrees about the jaws at which the long end begins and ends, from the side where it leaves the vessel."""
-
-SHARES = (((60, 0.88), (270, 0.88), (END, 0.82)), ((60, 0.98), (180, 0.96), (270, 0.90), (END, 0.84)))
-"""For each throw: share of the long end's length that its way about the jaws takes, by the angle."""
-
-ASIDE = (
-    ((90, 0.0), (180, -0.005), (340, -0.005), (END, 0.006)),
-    ((60, 0.006), (150, 0.004), (210, -0.005), (340, -0.005), (END, 0.006)),
-)
-"""For each throw: metres along the vessel from the loop to the left tool, by the angle: first and last it draws the
-loop to the root of the jaws, and between it passes in front of them."""
-
 BELOW, OVER = 0.013, 0.0075
 """Metres that the left tool keeps below the right one, and over the vessel."""
 
 RETRIES, ATTEMPTS = (0, 2, -2, 3), 5
 """Elements beside the first choice at which jaws that closed on nothing try again; how often a throw is tried."""
-
-SLOW, BRISK, FAST, CAREFUL = 0.03, 0.06, 0.08, 0.015
-FAR, REACH = 1.0, 0.5
-"""Metres along the shafts at which a thread is closed to see its knot; metres that no tool goes at once."""
 
 PULL, DRAWN, MOST = 0.3, 1.0, 8.0
 """Newtons with which a loop is drawn close, a throw is drawn tight, and the most."""
@@ -102,199 +86,6 @@ DRAWS = (
     (-0.003, 0.064, 0.03), (-0.003, 0.062, 0.045), (-0.02, 0.06, 0.05), (-0.04, 0.06, 0.05),
 )  # fmt: skip
 """Where the left hand goes one after the other until the throw is tight: along and beside the vessel, and above it."""
-
-
-class Missed(Failure):
-    """A throw did not succeed, but can be tried again."""
-
-
-def length_around(anchor: Array, angle: float, radius: float) -> float:
-    """Length of a taut thread from ``anchor`` (2,), around jaws at the origin, to ``radius`` at an ``angle``."""
-    away = float(np.hypot(*anchor))
-    first = np.arctan2(anchor[1], anchor[0]) + np.arccos(FINGER / away)
-    last = angle - np.arccos(min(1.0, FINGER / radius))
-    if last <= first:
-        return float(np.hypot(*(radius * np.array([np.cos(angle), np.sin(angle)]) - anchor)))
-    return float(np.sqrt(away**2 - FINGER**2) + FINGER * (last - first) + np.sqrt(max(radius**2 - FINGER**2, 0.0)))
-
-
-def radius_for(anchor: Array, angle: float, length: float, most: float = 0.045) -> float:
-    """Radius, `THINNEST` to ``most``, at which a thread of ``length`` is just taut."""
-    radii = np.linspace(THINNEST, most, 200)
-    fits = [radius for radius in radii if length_around(anchor, angle, radius) <= length]
-    return float(max(fits, default=THINNEST))
-
-
-def drawn(thread: Array, right: Array, left: Array) -> Diagram:
-    """The knot that tools at ``right`` and ``left`` (4, 4) make of a ``thread`` (n, 3) when they draw its ends away.
-
-    The right one takes the first end, the left one holds the last; along their shafts the thread is closed far away. If
-    it goes ``n`` times around the right tool, each time nearer to the first end, it is the torus knot (2, 2 n + 1).
-    """
-    pads = [T[:3, 3] + DEEP * T[:3, 2] for T in (right, left)]
-    far = [T[:3, 3] - FAR * T[:3, 2] for T in (right, left)]
-    return Diagram.of(np.vstack([far[0], pads[0], thread, pads[1], far[1]]))
-
-
-class TwoArms:
-    """Two arms and a thread that lies under a vessel: what they see, and how they move."""
-
-    def __init__(self, simulation: ligature.Simulation, watch: Callable[[], object] = lambda: None) -> None:
-        self.simulation, self._watch = simulation, watch
-        scene = simulation.scene
-        self.thread = list(scene.rods[0].bodies)
-        self._length = float(scene.rods[0].lengths.mean())
-        self._base = {arm.name: scene.bodies[arm.base].T_world_body for arm in scene.arms if arm.base >= 0}
-        self.arms: dict[str, PsmArm] = {}
-        for name in (RIGHT, LEFT):
-            arm = simulation.arms[name]
-            if not isinstance(arm, PsmArm) or arm.jaw is None:
-                raise Failure(f"{name} is not a PSM with a jaw")
-            self.arms[name] = arm
-            arm.place_jp(START)
-            arm.adopt()
-            arm.jaw.servo_jp([OPEN])
-        simulation.step(300)
-        self.tools = {name: self._base[name] @ pose_of(arm.local_measured_cp()) for name, arm in self.arms.items()}
-        self.jaws = dict.fromkeys(self.arms, OPEN)
-        block = next(body for body in scene.bodies if body.identity.name == "Block")
-        vessel = next(part for part in block.colliders if isinstance(part.shape, Cylinder))
-        assert isinstance(vessel.shape, Cylinder)
-        self._radius = vessel.shape.radius
-        centre = (block.T_world_body @ vessel.T_body_shape)[:3, 3]
-        under = np.linalg.norm((self.points() - centre)[:, 1:], axis=1).argmin()
-        self.vessel = np.array([self.points()[under, 0], *centre[1:]])
-
-    # --- seeing -------------------------------------------------------------------------------
-
-    def points(self) -> Array:
-        """Where the elements of the thread are (n, 3)."""
-        return np.array(self.simulation.state["body_pose"][0, self.thread, :3])
-
-    def tension(self) -> Array:
-        """Tension (n,) of the elements."""
-        return np.array(self.simulation.state["rod_tension"][0][self.thread])
-
-    def taut(self) -> float:
-        """Tension of the thread, the most of all of it but what is beside the pads, which bend it."""
-        tension = self.tension()
-        for held in (self.held(name) for name in self.arms):
-            if held is not None:
-                tension[max(held - BESIDE_PADS, 0) : held + BESIDE_PADS + 1] = 0.0
-        return float(tension.max())
-
-    def pull(self) -> float:
-        """Tension of the long end beside the left jaws."""
-        return float(self.tension()[self.must_hold(LEFT) - 6 :][:3].max())
-
-    def ends(self) -> tuple[float, float]:
-        """Tension of both ends beside the jaws that hold them."""
-        tension, right, left = self.tension(), self.must_hold(RIGHT), self.must_hold(LEFT)
-        return float(tension[right + 4 : right + 8].max()), float(tension[left - 6 : left - 3].max())
-
-    def held(self, name: str) -> int | None:
-        """The element between the jaws of an arm."""
-        grasp = self.simulation.grasps[name]
-        return None if grasp is None or grasp.body not in self.thread else self.thread.index(grasp.body)
-
-    def must_hold(self, name: str) -> int:
-        """The same; raises `Missed` when the arm holds nothing."""
-        held = self.held(name)
-        if held is None:
-            raise Missed(f"{name} lost the thread")
-        return held
-
-    def roll(self, name: str, T: Array) -> float:
-        """How far an arm's instrument is rolled when its tool is at ``T`` (4, 4)."""
-        return float(abs(self.arms[name].kinematics.inverse(np.array([inverse(self._base[name]) @ T])).q[0, 3]))
-
-    def tool(self, way: Array, along: Array, point: Array) -> Array:
-        """Pose (4, 4) of a tool along ``way`` (3,) that holds a thread at ``point``, which there runs ``along``."""
-        z = way / np.linalg.norm(way)
-        x = along - (along @ z) * z
-        x = x / np.linalg.norm(x)
-        return frame(np.column_stack([x, np.cross(z, x), z]), point - DEEP * z)
-
-    def held_at(self, name: str, point: Array) -> Array:
-        """A tool, turned as it is, with what it holds at ``point`` (3,)."""
-        R = self.tools[name][:3, :3]
-        return frame(R, point - DEEP * R[:, 2])
-
-    def _left_at(self, point: Array) -> Array:
-        return self.held_at(LEFT, point)
-
-    # --- moving -------------------------------------------------------------------------------
-
-    def tick(self) -> None:
-        """Send a set-point to all, and advance."""
-        for name, arm in self.arms.items():
-            try:
-                arm.servo_cp(inverse(self._base[name]) @ self.tools[name])
-            except Rejected as rejection:
-                raise Failure(str(rejection)) from rejection
-            assert arm.jaw is not None
-            arm.jaw.servo_jp([self.jaws[name]])
-        self.simulation.step(round(STREAM / self.simulation.dt))
-        self._watch()
-
-    def wait(self, seconds: float) -> None:
-        """Hold still."""
-        for _ in range(round(seconds / STREAM)):
-            self.tick()
-
-    def go(
-        self,
-        goals: Mapping[str, Array],
-        jaws: Mapping[str, float] | None = None,
-        speed: float = 0.04,
-        until: Callable[[], bool] = lambda: False,
-        meanwhile: Callable[[], None] = lambda: None,
-    ) -> None:
-        """Tools go straight to their ``goals`` (4, 4), and jaws to their angles, all in the same time."""
-        jaws = jaws or {}
-        start, opening = {name: self.tools[name].copy() for name in goals}, {name: self.jaws[name] for name in jaws}
-        turn = {name: rotation_vector(start[name][:3, :3].T @ T[:3, :3]) for name, T in goals.items()}
-        way = {name: T[:3, 3] - start[name][:3, 3] for name, T in goals.items()}
-        for name, w in way.items():
-            if not float(np.linalg.norm(w)) < REACH:
-                raise Missed(f"{name} was to go {float(np.linalg.norm(w)):.2g} m, farther than it reaches")
-        seconds = [
-            STREAM,
-            *(float(np.linalg.norm(w)) / speed for w in way.values()),
-            *(float(np.linalg.norm(w)) / 2.0 for w in turn.values()),
-            *(abs(angle - opening[name]) / 4.0 for name, angle in jaws.items()),
-        ]
-        for share in np.linspace(0.0, 1.0, int(np.ceil(max(seconds) / STREAM)) + 1)[1:]:
-            for name in goals:
-                angle = float(np.linalg.norm(turn[name]))
-                R = axis_rotation(turn[name] / angle, share * angle) if angle > 1e-9 else np.eye(3)
-                self.tools[name] = frame(start[name][:3, :3] @ R, start[name][:3, 3] + share * way[name])
-            for name, angle in jaws.items():
-                self.jaws[name] = opening[name] + share * (angle - opening[name])
-            meanwhile()
-            self.tick()
-            if until():
-                break
-
-    def take(self, name: str, way: Array, element: int, towards: int) -> None:
-        """An arm takes the thread; where its jaws close on nothing, it tries nearer to the vessel (``towards``)."""
-        for more in (0, 2, -2, 4):
-            at = element + towards * more
-            self.go({name: drawn_back(self._grasp(name, way, at), 0.03)}, {name: FINGER_OPEN}, speed=FAST)
-            self.go({name: drawn_back(self._grasp(name, way, at), 0.012)})
-            self.go({name: self._grasp(name, way, at)}, speed=SLOW)
-            self.go({}, {name: SHUT})
-            self.wait(0.2)
-            if self.held(name) is not None:
-                return
-            self.go({name: drawn_back(self.tools[name], 0.012)}, {name: FINGER_OPEN})
-        raise Missed(f"{name} did not find the thread")
-
-    def _grasp(self, name: str, way: Array, element: int) -> Array:
-        points = self.points()
-        along = points[element + 1] - points[element - 1]
-        both = [self.tool(way, sign * along, points[element]) for sign in (1.0, -1.0)]
-        return min(both, key=lambda T: self.roll(name, T))
 
 
 class Knotter(TwoArms):
@@ -346,6 +137,10 @@ class Knotter(TwoArms):
         near = (np.abs(local[:, 2] + 0.008) < 0.018) & (np.hypot(local[:, 0], local[:, 1]) < 0.007)
         angles = np.unwrap(np.arctan2(local[near, 1], local[near, 0]))
         return bool(near.any() and np.ptp(angles) > np.pi)
+
+    def _left_at(self, point: Array) -> Array:
+        """The left tool, turned as it is, with what it holds at ``point`` (3,)."""
+        return self.held_at(LEFT, point)
 
     # --- the short end ------------------------------------------------------------------------
 
@@ -452,11 +247,11 @@ class Knotter(TwoArms):
         low = centre[2] - self.vessel[2] - OVER
         for degrees in range(BEGIN, END + 1, 10):
             angle = np.radians(degrees)
-            radius = radius_for(anchor, angle, _between(SHARES[self.throws], degrees) * free)
+            radius = radius_for(anchor, angle, between(SHARES[self.throws], degrees) * free)
             if np.sin(angle) < 0.0:
                 radius = min(radius, BELOW / -np.sin(angle), max(low / -np.sin(angle), THINNEST))
             way = np.array([0.0, side * np.cos(angle), np.sin(angle)])
-            at = centre + [_between(ASIDE[self.throws], degrees), 0.0, 0.0] + radius * way
+            at = centre + [between(ASIDE[self.throws], degrees), 0.0, 0.0] + radius * way
             self.go({LEFT: self._left_at(at)}, speed=BRISK)
         snug = at + (0.045 - radius) * way + [0.004, 0.0, 0.0]
         self.go({LEFT: self._left_at(snug)}, speed=SLOW, until=lambda: self.pull() > SNUG)
@@ -591,11 +386,6 @@ class Knotter(TwoArms):
 
 def _unit(way: Array) -> Array:
     return np.asarray(way / np.linalg.norm(way))
-
-
-def _between(table: tuple[tuple[int, float], ...], at: float) -> float:
-    """The value of a table of (angle, value) at an angle."""
-    return float(np.interp(at, [angle for angle, _ in table], [value for _, value in table]))
 
 
 def scattered(scene: Scene, seed: int) -> Scene:

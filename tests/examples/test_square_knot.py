@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from ligature.model.frames import frame
 from scipy.spatial import ConvexHull
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 sys.path.insert(0, str(EXAMPLES))
 
+import looping  # noqa: E402
 import square_knot  # noqa: E402
+import two_arms  # noqa: E402
 
 
 @given(st.floats(-2.0, -1.2), st.floats(0.01, 0.05), st.floats(1.1, 3.0), st.floats(0.011, 0.045))
@@ -24,9 +27,9 @@ def test_a_taut_thread_around_the_jaws_is_half_the_hull_of_its_ends_and_the_jaws
 ) -> None:
     """Up to half a turn: the shortest way around a circle is the part of the convex hull on that side."""
     anchor, end = (r * np.array([np.cos(a), np.sin(a)]) for r, a in ((away, at), (radius, angle)))
-    found = square_knot.length_around(anchor, angle, radius)
+    found = looping.length_around(anchor, angle, radius)
     around = np.linspace(0.0, 2.0 * np.pi, 4000)
-    circle = square_knot.FINGER * np.column_stack([np.cos(around), np.sin(around)])
+    circle = looping.FINGER * np.column_stack([np.cos(around), np.sin(around)])
     points = np.vstack([anchor, end, circle])
     hull = points[ConvexHull(points).vertices]  # counter-clockwise
     start = int(np.flatnonzero((hull == anchor).all(axis=1))[0])
@@ -41,9 +44,9 @@ def test_the_left_tool_never_draws_the_thread_taut_but_where_it_must_keep_clear(
     height: float, angle: float, length: float
 ) -> None:
     anchor = np.array([0.003, -height])
-    radius = square_knot.radius_for(anchor, angle, length)
-    assert radius >= square_knot.THINNEST
-    assert radius == square_knot.THINNEST or square_knot.length_around(anchor, angle, radius) <= length
+    radius = looping.radius_for(anchor, angle, length)
+    assert radius >= looping.THINNEST
+    assert radius == looping.THINNEST or looping.length_around(anchor, angle, radius) <= length
 
 
 @given(st.integers(-4, 4), st.floats(0.004, 0.012), st.floats(-0.002, 0.002), st.integers(0, 2**32 - 1))
@@ -51,17 +54,17 @@ def test_a_thread_around_the_right_tool_is_drawn_to_the_torus_knot_of_its_turns(
     turns: int, radius: float, aside: float, seed: int
 ) -> None:
     """Of 2 n + 1 crossings: determinant ``|2 n + 1|``, signature ``|2 n + 1| - 1`` (Livingston, Knot Theory, 1993)."""
-    right = square_knot.frame(np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]), [0.0, 0.0, 0.03])
+    right = frame(np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]), [0.0, 0.0, 0.03])
     way = square_knot.TAKES / np.linalg.norm(square_knot.TAKES)
     across = np.cross([0.0, 1.0, 0.0], way) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], way))
-    left = square_knot.frame(np.column_stack([across, np.cross(way, across), way]), [0.01, 0.03, 0.06])
+    left = frame(np.column_stack([across, np.cross(way, across), way]), [0.01, 0.03, 0.06])
     below = np.array([[-0.02, aside, 0.03], [0.0, -0.003, 0.0], [0.0, 0.003, 0.0], [0.008, 0.016, 0.02]])
     angle = np.linspace(0.0, 2.0 * np.pi * turns, 40 * abs(turns) + 2)
     towards_the_tip = np.linspace(0.008, 0.002, len(angle))
     around = np.column_stack([towards_the_tip, radius * np.cos(angle), 0.03 + radius * np.sin(angle)])
     thread = np.vstack([below, around])
     thread += np.random.default_rng(seed).uniform(-1e-5, 1e-5, thread.shape)
-    found, crossings = square_knot.drawn(thread, right, left), 2 * turns + 1
+    found, crossings = looping.drawn(thread, right, left), 2 * turns + 1
     assert found.determinant == abs(crossings)
     assert found.signature == np.sign(crossings) * (abs(crossings) - 1)
 
@@ -89,21 +92,21 @@ def test_another_seed_lays_vessel_and_thread_elsewhere_together(seed: int) -> No
 @pytest.mark.parametrize("throw", [0, 1])
 def test_tables_of_a_throw_go_from_its_first_to_its_last_angle(throw: int) -> None:
     """`numpy.interp` takes angles that do not rise without a word."""
-    for table in (square_knot.SHARES[throw], square_knot.ASIDE[throw]):
+    for table in (looping.SHARES[throw], looping.ASIDE[throw]):
         angles = [angle for angle, _ in table]
-        assert angles == sorted(set(angles)) and angles[-1] == square_knot.END
-        assert all(square_knot._between(table, angle) == value for angle, value in table)
+        assert angles == sorted(set(angles)) and angles[-1] == looping.END
+        assert all(looping.between(table, angle) == value for angle, value in table)
 
 
 def test_the_short_end_stands_where_the_right_arm_bends_it() -> None:
     """Without the yield of the scene's thread it springs back by tens of millimetres."""
     knotter = square_knot.Knotter(ligature.Simulation(ligature.load(square_knot.SCENE)))
-    knotter.take(square_knot.RIGHT, square_knot.REACHES, knotter.tail, 1)
+    knotter.take(two_arms.RIGHT, square_knot.REACHES, knotter.tail, 1)
     knotter.stand()
     stood = knotter.points()[knotter.tail]
     assert abs(stood[0] - knotter.vessel[0] - square_knot.LEAN) < 0.025  # last bits, other processors: 3 to 20 mm
     assert abs(stood[1] - knotter.vessel[1]) < 0.009
-    assert knotter.held(square_knot.RIGHT) is None
+    assert knotter.held(two_arms.RIGHT) is None
     knotter.wait(0.5)
     assert np.linalg.norm(knotter.points()[knotter.tail] - stood) < 0.001
 
