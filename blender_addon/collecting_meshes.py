@@ -36,7 +36,7 @@ def mesh_sources(objects: list[bpy.types.Object], words: str) -> Steps[list[Mesh
         yield words, 0.5 + 0.5 * len(found) / len(shaped)
         now = prints[obj.name_full]
         source = MeshSource(
-            key=obj.adf.key, name=obj.name, clean_name=bpy.path.clean_name(obj.name), type=obj.type, print=now,
+            key=obj.adf.key, name=obj.name, clean_name=bpy.path.clean_name(obj.name), type=obj.type, fingerprint=now,
             **own[obj.name_full],
         )  # fmt: skip
         if obj.adf.mesh_print != now:

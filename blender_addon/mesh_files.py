@@ -123,13 +123,13 @@ class MeshFiles:
         """Write the visual mesh; linked duplicates share one file."""
         if source.type != "MESH":
             return {}
-        given, shared = source.places[HIGH], self._shared.get(source.print)
+        given, shared = source.places[HIGH], self._shared.get(source.fingerprint)
         if shared is not None and (source.surfaces is None or shared[0] == given):
             return {"mesh": shared[1]}
         assert source.surfaces is not None
         target = self._target(HIGH, source, "")
         name = self._named(HIGH, source, target)
-        self._shared[source.print] = (given, name)
+        self._shared[source.fingerprint] = (given, name)
         self.files.update(_obj_files(target, source.surfaces, source.name, source.scale))
         self.files.update({target.parent / texture: data for texture, data in source.textures.items()})
         return {"mesh": name}
@@ -138,7 +138,7 @@ class MeshFiles:
         """Write the convex parts of the collision shape to one file."""
         if not source.hulls:
             return {}
-        whole = (source.places[LOW], f"hulls of {source.print}")
+        whole = (source.places[LOW], f"hulls of {source.fingerprint}")
         if source.collision_mesh and self._shared.get(whole[1], (None, ""))[0] == whole[0]:
             return {"collision mesh": self._shared[whole[1]][1]}
         target = self._target(LOW, source, "_collision")

@@ -17,25 +17,29 @@ class MeshSource:
 
     Attributes
     ----------
+    key, name, type
+        Those of the object in the model file and in Blender, and its type there.
     mesh, collision_mesh, scale, collision_type_given
         The object's own keys.
     places
         For `HIGH` and `LOW`: the folder below the model's that the object states, and the name of its file there.
     clean_name, taken
         A name for files after the object, and names in lower case that other objects use.
-    print
+    fingerprint
         A text that tells meshes apart.
     changed
         Whether the files have to be written again; those of any other object may have to move.
     surfaces, hulls
         Triangles of the object, None where an equal mesh has them, and of each convex part.
+    textures, problems
+        Pictures of its materials by the names of their files, and what could not be written of them.
     """
 
     key: str
     name: str
     clean_name: str
     type: str
-    print: str
+    fingerprint: str
     mesh: str
     collision_mesh: str
     scale: float

@@ -91,6 +91,7 @@ def _gravity(names: tuple[str, ...]) -> Reading:
 
 
 def _frame(message: Any, record: Record, base: str, referred: bool) -> None:
+    """Name the frame of a message: the base, or for what is ``referred`` that of ``set_base_frame``, if it was set."""
     reference = record["reference"] if referred else b""
     message.header.frame_id = reference.decode("utf-8", "replace") if reference else base
 
