@@ -238,11 +238,9 @@ CACHES: dict[str, str] = {
         (
             *(f"GhostArrays.{name}" for name in ("apart", "measured", "room", "inside", "due", "seen", "moved")),
             *(f"Ghosts._{name}" for name in ("apart", "measured", "room", "inside", "due", "seen", "moved")),
-            "Contacts._tick",
-            "Contacts._found",
-            "Contacts._numbers",
+            "Contacts._table",
             "Contacts._groups",
-            "Contacts._information",
+            "ContactWrenches._groups",
             "Ghosts.sensed",
         ),
         "saves asking again; `sense` fills it from the state",

@@ -323,3 +323,24 @@ def test_a_snapshot_in_the_middle_of_moves_continues_bit_for_bit(whole: Simulati
 def test_an_unknown_arm_is_named_with_the_known_ones(whole: Simulation) -> None:
     with pytest.raises(KeyError, match="unknown arm 'PSM3'; choose one of PSM1, PSM2, ECM, MTML, MTMR"):
         whole.arms["PSM3"]
+
+
+def test_what_a_tip_feels_after_a_restore_is_not_what_it_felt_as_many_ticks_after_another() -> None:
+    pegs = ligature.load(ROOT / "scenes" / "peg_transfer" / "launch.yaml", [0, 1, 2])
+    simulation, fresh = Simulation(pegs), Simulation(pegs)
+    block = next(body.index for body in pegs.bodies if body.identity.name == "Block2")
+    apart = simulation.snapshot()
+    simulation.set_pose(block, simulation.state["body_pose"][0, pegs.jaws[0].fingers[0]])
+    touching = simulation.snapshot()
+    rng = np.random.default_rng(2)
+    for ticks in rng.integers(1, 30, 6).tolist():
+        for snapshot in (apart, touching, apart):
+            simulation.restore(snapshot)
+            simulation.step(ticks)
+            fresh.restore(snapshot)
+            fresh.step(31)
+            fresh.restore(snapshot)
+            fresh.step(ticks)
+            assert simulation.state_hash(clock=False) == fresh.state_hash(clock=False), ticks
+            felt = simulation.arms["PSM1"].spatial_measured_cf().any()
+            assert felt == (snapshot is touching), ticks

@@ -128,9 +128,10 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
     def write_state(self, state: StateRecord) -> None:
         """Write the state of all arms."""
         if self._arms:
+            felt = self._world.wrenches.felt()
             for m, arm in enumerate(self._arms):
                 try:
-                    self._records.look(m, state)
+                    self._records.look(m, state, felt)
                 except Exception as error:
                     self._fault("write_state", arm, error)
             motions = self._world.engine.motions

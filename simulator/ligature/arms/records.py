@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from operator import attrgetter, is_
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from ligature.kernels import compiled
 from ligature.model.state import ARM_DTYPE, ARM_JOINTS, StateRecord
 from ligature.physics.bullet import real_at
+from ligature.physics.contact_wrenches import ALWAYS_FELT
 from ligature.physics.trees import Trees, open_trees, read_tree
 from ligature.robots.arm import Arm
 from ligature.robots.axes import Axes, Mode
@@ -33,6 +35,13 @@ GROUPS = 2
 
 INPUTS = 6 * (ARM_JOINTS + 1) + 6
 """Numbers of which those of the tip are made: joints, opening, wrench."""
+
+
+UNKNOWN = (None,)
+"""An outline that no arm has: its first part is never None."""
+
+FROM_DRIVES = ALWAYS_FELT
+"""The group of an arm whose wrench follows from its drives."""
 
 
 class ArmArrays(NamedTuple):
@@ -151,10 +160,11 @@ class ArmRecords:
         self._groups = [(m, g, group) for m, arm in enumerate(arms) for g, group in enumerate(_groups(arm))]
         for m, g, group in self._groups:
             self._find(m, g, group)
-        self._outlines: list[tuple[Any, ...]] = [()] * len(arms)
+        self._outline_of = [attrgetter(*arm.outline()) for arm in arms]
+        self._outlines: list[tuple[Any, ...]] = [UNKNOWN] * len(arms)
         self._bases = [arm.base_frame for arm in arms]
-        self._wrenches: list[tuple[Callable[[], bool] | None, Callable[[], Array]]] = []
-        self._wrenches += [(None, arm.spatial_measured_cf) for arm in arms]
+        self._groups_felt = [FROM_DRIVES] * len(arms)
+        self._felt = [True] * len(arms)
         self._state: StateRecord | None = None
         self._numbers = np.zeros((0, NUMBERS))
 
@@ -170,17 +180,18 @@ class ArmRecords:
         else:
             arrays.fingers[m] = True
 
-    def look(self, m: int, state: StateRecord) -> None:
-        """Take down what commands and contacts changed of arm ``m``, for `write`."""
+    def look(self, m: int, state: StateRecord, felt: int) -> None:
+        """Take down what commands and contacts changed of arm ``m``, for `write`; ``felt`` is that of wrenches."""
         if state is not self._state:
             self._attach(state)
-        arm = self._arms[m]
-        outline = arm.outline()
-        if outline != self._outlines[m]:
-            self._renew(m, arm, state)
+        outline = self._outline_of[m](self._arms[m])
+        if not all(map(is_, outline, self._outlines[m])):
+            self._renew(m, self._arms[m], state)
             self._outlines[m] = outline
-        feels, wrench = self._wrenches[m]
-        self._arrays.wrench[m] = wrench() if feels is None or feels() else 0.0
+        if self._groups_felt[m] & felt:
+            self._arrays.wrench[m], self._felt[m] = self._arms[m].spatial_measured_cf(), True
+        elif self._felt[m]:
+            self._arrays.wrench[m], self._felt[m] = 0.0, False
 
     def write(self, handle: int, trees: Integers) -> bool:
         """Write numbers that have changed, and return whether any have; the arguments are those of `Motions`."""
@@ -195,7 +206,7 @@ class ArmRecords:
         records = state["arm"][0]
         fields = np.asarray(records).view(np.uint8).reshape(len(self._arms), ARM_DTYPE.itemsize)
         self._numbers = fields[:, _FIRST_NUMBER:].view(np.float64)
-        self._outlines = [()] * len(self._arms)
+        self._outlines = [UNKNOWN] * len(self._arms)
 
     def _renew(self, m: int, arm: Arm, state: StateRecord) -> None:
         """Update modes, kinematics and frames of an arm, and write its status."""
@@ -207,7 +218,7 @@ class ArmRecords:
         arrays.table[m, : len(table)] = table
         arrays.base[m], arrays.absolute[m], arrays.fresh[m] = arm.base_frame, arm.cf_orientation_absolute, True
         self._bases[m] = arm.base_frame  # kept, so that no other gets its identity
-        self._wrenches[m] = getattr(arm.tip_wrench, "feels", None), arm.spatial_measured_cf
+        self._groups_felt[m] = getattr(arm.tip_wrench, "group", FROM_DRIVES)
         _write_status(state["arm"][0][m], arm)
 
 

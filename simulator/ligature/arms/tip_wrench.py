@@ -21,16 +21,18 @@ class TipWrench:
     def __init__(self, world: World, description: ArmDescription, bodies: Sequence[int], arm: Arm) -> None:
         self._world, self._base, self._bodies, self._arm = world, description.base, tuple(bodies), arm
 
-    def feels(self) -> bool:
-        """Whether there may be any: a quick look."""
-        return self._world.wrenches.any(self._bodies)
+    @property
+    def group(self) -> int:
+        """The bit in `ContactWrenches.felt` without which it is zero."""
+        return self._world.wrenches.group(self._bodies)
 
     def __call__(self) -> Array:
         """Force (N) and moment (N m), (6,)."""
-        if not self.feels():
+        wrenches = self._world.wrenches
+        if not wrenches.felt() & self.group:
             return np.zeros(6)
         T_world_base = pose7_matrix(self._world.pose7(self._base))
         tip = T_world_base @ self._arm.kinematics.forward(self._arm.joints.measured()[0])
-        wrench = self._world.wrenches.on(self._bodies, tip[:3, 3])
+        wrench = wrenches.on(self._bodies, tip[:3, 3])
         R = T_world_base[:3, :3].T
         return np.concatenate([R @ wrench[:3], R @ wrench[3:]])

@@ -10,13 +10,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.physics.contacts import Contacts
+from ligature.physics.contacts import MOST_GROUPS, Contacts
 from ligature.physics.engine import Engine
 from ligature.physics.impulses import Impulses
 from ligature.physics.welds import Welds
 from ligature.physics.wrenches import about, contact_wrench
 
 Array = NDArray[np.float64]
+
+ALWAYS_FELT = 1 << 63
+"""The bit of groups that have none of their own."""
 
 
 class ContactWrenches:
@@ -25,21 +28,44 @@ class ContactWrenches:
     def __init__(self, engine: Engine, welds: Welds, impulses: Impulses) -> None:
         self._engine, self._welds, self._impulses = engine, welds, impulses
         self._owned: dict[tuple[int, ...], frozenset[tuple[int, int]]] = {}
+        self._groups: list[tuple[int, ...]] = []
         self._contacts = Contacts(engine)
 
-    def any(self, bodies: Sequence[int]) -> bool:
-        """Whether `on` may find anything: a quick look."""
-        if self._impulses.act(bodies):
-            return True
+    def group(self, bodies: Sequence[int]) -> int:
+        """The bit of a group of ``bodies`` in what is `felt`; the sign's, which always is, once there are too many."""
+        group = tuple(bodies)
+        if group not in self._groups:
+            if len(self._groups) == MOST_GROUPS:
+                return ALWAYS_FELT
+            self._groups.append(group)
+            self._contacts.add(len(self._groups) - 1, group, self._own(group))
+        return 1 << self._groups.index(group)
+
+    def felt(self) -> int:
+        """The groups for which `on` may find anything, one bit each: a quick look."""
+        found = ALWAYS_FELT
+        if self._engine.motions.handle:
+            found |= self._contacts.felt(self._impulses.acted)
+        else:
+            for number, group in enumerate(self._groups):
+                if self._contacts.touch(self._own(group)) or self._impulses.act(group):
+                    found |= 1 << number
         for weld in self._welds:
-            if weld.parent in bodies or weld.child in bodies:
-                return True
-        return self._contacts.touch(tuple(bodies), self._own(bodies))
+            for number, group in enumerate(self._groups):
+                if weld.parent in group or weld.child in group:
+                    found |= 1 << number
+        return found
+
+    def forget(self) -> None:
+        """Contacts are others now, though no tick passed."""
+        self._contacts.forget()
 
     def rebuild(self) -> None:
         """Forget where bodies were in an engine that was rebuilt."""
         self._owned = {}
         self._contacts = Contacts(self._engine)
+        for number, group in enumerate(self._groups):
+            self._contacts.add(number, group, self._own(group))
 
     def _own(self, bodies: Sequence[int]) -> frozenset[tuple[int, int]]:
         """Multibody and link of each of ``bodies``."""

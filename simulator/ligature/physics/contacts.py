@@ -1,77 +1,106 @@
-"""Which groups of bodies touched something else in the last tick: one look at all contacts for all groups."""
+"""What groups of bodies feel: one look at all contacts of the last tick for all groups, and at what pushes bodies."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from ligature.kernels import kernel
-from ligature.physics.bullet import get_contacts, init_contact_request, submit, whole_at
+from ligature.kernels import inlined, kernel
+from ligature.physics.bullet import get_contacts, init_contact_request, submit, whole_at, word_at
 from ligature.physics.engine import Engine
+from ligature.tables import opener, table_of
 
 Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 CONTACT_BYTES = 176
 """Size of Bullet's `b3ContactPointData`; whole numbers from byte 4 on are multibodies and links of both sides."""
 
+MOST_GROUPS = 62
+"""Groups that have a bit each."""
 
-@kernel
-def _touching(handle: int, information: Integers, groups: Integers) -> int:
-    """The groups with a contact outside their group, one bit each.
 
-    ``groups`` (u, l) holds the groups of each multibody's links, the base first. ``information`` (3,) is its own
-    address and Bullet's answer, a number of contacts and their address.
-    """
+class Groups(NamedTuple):
+    """The groups of each link and body, one bit for each group: u multibodies of at most l links, b bodies."""
+
+    of_link: Integers  # (u, 1 + l), the base first
+    of_body: Integers  # (b,)
+    answer: Integers  # (3,) its own address, and where Bullet puts a number of contacts and their address
+    seen: Integers  # (2,) the tick whose contacts were looked at, -1 for none, and the groups with one
+
+
+_open_groups = opener(Groups(np.zeros((1, 1), np.int64), *np.zeros((3, 1), np.int64)))
+
+
+@inlined
+def _touching(handle: int, groups: Groups) -> int:
+    """The groups with a contact outside their group in the last tick."""
     submit(handle, init_contact_request(handle))
-    get_contacts(handle, information[0] + 8)
-    found = 0
-    for i in range(whole_at(information[0] + 8)):
-        at = information[2] + i * CONTACT_BYTES
+    get_contacts(handle, groups.answer[0] + 8)
+    found, of_link = 0, groups.of_link
+    for i in range(whole_at(groups.answer[0] + 8)):
+        at = word_at(groups.answer[0] + 16) + i * CONTACT_BYTES
         a, b = whole_at(at + 4), whole_at(at + 8)
-        one = groups[a, 1 + whole_at(at + 12)] if 0 <= a < groups.shape[0] else 0
-        other = groups[b, 1 + whole_at(at + 16)] if 0 <= b < groups.shape[0] else 0
+        one = of_link[a, 1 + whole_at(at + 12)] if 0 <= a < of_link.shape[0] else 0
+        other = of_link[b, 1 + whole_at(at + 16)] if 0 <= b < of_link.shape[0] else 0
         found |= one & ~other
         if a != b:  # Bullet gives a contact between links of one multibody in one order only
             found |= other & ~one
     return found
 
 
+@kernel
+def felt(handle: int, ticks: Integers, acted: Flags, table: Integers) -> int:
+    """The groups with a contact outside their group in the last of the ``ticks``, or with a body that is ``acted`` on.
+
+    ``table`` is that of `Groups`.
+    """
+    groups = _open_groups(table)
+    if groups.seen[0] != ticks[0]:
+        groups.seen[0], groups.seen[1] = ticks[0], _touching(handle, groups)
+    found = groups.seen[1]
+    for body in range(acted.shape[0]):
+        if acted[body]:
+            found |= groups.of_body[body]
+    return found
+
+
 class Contacts:
-    """The contacts of an engine's client in the last tick."""
+    """What groups of an engine's bodies feel, for the engine's present client."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        self._numbers: dict[tuple[int, ...], int] = {}
-        links = [(uid, link) for uid, link in engine.body_at]
-        self._groups = np.zeros((1 + max((u for u, _ in links), default=0), 2 + max((n for _, n in links), default=0)),
-                                dtype=np.int64)  # fmt: skip
-        self._information = np.zeros(3, dtype=np.int64)
-        self._information[0] = self._information.ctypes.data
-        self._tick, self._found = -1, 0
+        places = list(engine.body_at)
+        shape = 1 + max((uid for uid, _ in places), default=0), 2 + max((link for _, link in places), default=0)
+        whole = np.int64
+        self._groups = Groups(np.zeros(shape, whole), np.zeros(len(engine.scene.bodies), whole), np.zeros(3, whole),
+                              np.full(2, -1))  # fmt: skip
+        self._groups.answer[0] = self._groups.answer.ctypes.data
+        self._table = table_of(self._groups)
 
-    def touch(self, bodies: tuple[int, ...], own: Collection[tuple[int, int]]) -> bool:
-        """Whether ``bodies``, which are ``own`` multibodies and links, touched others in the last tick."""
+    def add(self, number: int, bodies: Sequence[int], own: Collection[tuple[int, int]]) -> None:
+        """Add group ``number`` of ``bodies``, which are ``own`` multibodies and links."""
+        for uid, link in own:
+            self._groups.of_link[uid, 1 + link] |= 1 << number
+        for body in bodies:
+            self._groups.of_body[body] |= 1 << number
+        self.forget()
+
+    def forget(self) -> None:
+        """Bullet's contacts are others now, though no tick passed."""
+        self._groups.seen[:] = -1
+
+    def felt(self, acted: Flags) -> int:
+        """The groups that touch others, or with a body that is ``acted`` on, one bit each; it takes a handle."""
         motions = self._engine.motions
-        if not motions.handle:
-            return self._touch(own)
-        number = self._numbers.get(bodies)
-        if number is None:
-            number = self._numbers[bodies] = len(self._numbers)
-            if number < 63:
-                for uid, link in own:
-                    self._groups[uid, 1 + link] |= 1 << number
-            self._tick = -1
-        if number >= 63:
-            return self._touch(own)
-        tick = int(motions.trees.ticks[0])
-        if tick != self._tick:
-            self._tick, self._found = tick, int(_touching(motions.handle, self._information, self._groups))
-        return bool(self._found >> number & 1)
+        return int(felt(motions.handle, motions.trees.ticks, acted, self._table))
 
-    def _touch(self, own: Collection[tuple[int, int]]) -> bool:
+    def touch(self, own: Collection[tuple[int, int]]) -> bool:
+        """Whether ``own`` multibodies and links touched others in the last tick; this asks PyBullet."""
         return any(
             (found[1], found[3]) in own and (found[2], found[4]) not in own
             for uid in {uid for uid, _ in own}

@@ -418,7 +418,7 @@ class World(Subsystem):
         self.masses.restart()
         self.welds.repeat()
         self.chunks.follow()
-        self.engine.forget_contacts()
+        self._forget_contacts()
 
     def recover(self) -> None:
         """Put every body back, and clear all commands."""
@@ -440,7 +440,11 @@ class World(Subsystem):
             part.restore(snapshot[name])
         self._owned_reported = snapshot["owned_reported"]
         self.chunks.follow()
+        self._forget_contacts()
+
+    def _forget_contacts(self) -> None:
         self.engine.forget_contacts()
+        self.wrenches.forget()
 
     def renew(self) -> None:
         """Go on in another Bullet client, as after a restore."""

@@ -39,11 +39,15 @@ def damped_inverse(jacobian: Array, twist: Array) -> Array:
 
 
 class NoWrench:
-    """The wrench on a tip that nothing touches."""
+    """The wrench on a tip that nothing touches.
 
-    def feels(self) -> bool:
-        """Whether there may be any: never."""
-        return False
+    Attributes
+    ----------
+    group
+        No bit of what bodies feel.
+    """
+
+    group = 0
 
     def __call__(self) -> Array:
         """Zeros (6,)."""
@@ -117,13 +121,14 @@ class Arm(Device):
         *Device._KEPT, "reference", "gravity_compensation", "cf_orientation_absolute", "_T_reference_base", "_pushing",
     )  # fmt: skip
 
-    def outline(self) -> tuple[Any, ...]:
-        """What commands alone change of what the arm reports: the same as long as none of it does."""
-        axes, base = self.joints, id(self._T_reference_base)
-        return (
-            self._state, self._homed, self._busy, axes.mode, axes.ratio_v, axes.ratio_a, self.reference, base,
-            self.kinematics, self.cf_orientation_absolute, self._tip_wrench,
-        )  # fmt: skip
+    _OUTLINE = (
+        "_state", "_homed", "_busy", "joints.mode", "joints.ratio_v", "joints.ratio_a", "reference",
+        "_T_reference_base", "kinematics", "cf_orientation_absolute", "_tip_wrench",
+    )  # fmt: skip
+
+    def outline(self) -> tuple[str, ...]:
+        """Names of what commands alone change of what the arm reports; whatever changes is another object then."""
+        return self._OUTLINE
 
     @property
     def tip_wrench(self) -> Callable[[], Array] | None:

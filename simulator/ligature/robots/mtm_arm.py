@@ -56,9 +56,9 @@ class MtmArm(Arm):
 
     _KEPT = (*Arm._KEPT, "_closed", "_locked")
 
-    def outline(self) -> tuple[Any, ...]:
+    def outline(self) -> tuple[str, ...]:
         """See `Arm.outline`; the gripper's mode, too."""
-        return *super().outline(), self.gripper.mode
+        return *super().outline(), "gripper.mode"
 
     def gripper_measured_js(self) -> JointState:
         """Opening of the gripper, its speed and effort, each (1,)."""

@@ -5,8 +5,6 @@ Metres, radians; the jaw angle is the opening between its two fingers.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -95,9 +93,9 @@ class PsmArm(Arm):
         """Name and model number of the instrument."""
         return self.kinematics.instrument.type
 
-    def outline(self) -> tuple[Any, ...]:
-        """See `Arm.outline`; the jaw's mode and the tool, too."""
-        return *super().outline(), self.tool_present, None if self._jaw_axes is None else self._jaw_axes.mode
+    def outline(self) -> tuple[str, ...]:
+        """See `Arm.outline`; the tool and the jaw's mode, too."""
+        return *super().outline(), "tool_present", *(() if self._jaw_axes is None else ("_jaw_axes.mode",))
 
     @property
     def depth(self) -> float:

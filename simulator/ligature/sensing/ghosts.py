@@ -84,6 +84,15 @@ _open_ghosts = opener(
 
 
 @compiled
+def _look(table: Integers, ghost_world: Array, body_pose: Array, sensed: Flags) -> bool:
+    """Flag the pairs to measure; whether there are any. Without any, fill ``sensed`` as `_find_inside` does."""
+    found = _pairs_to_measure(table, ghost_world, body_pose)
+    if not found:
+        _find_inside(table, ghost_world, body_pose, sensed)
+    return found
+
+
+@compiled
 def _find_inside(table: Integers, ghost_world: Array, body_pose: Array, sensed: Flags) -> None:
     """Fill ``sensed`` (g, b): the bodies inside as they were measured, and the elements that touch a piece."""
     g = _open_ghosts(table)
@@ -299,9 +308,9 @@ class Ghosts(Subsystem):
         """Update ``sensed``; ``ghost_world`` (ghosts, 7) and ``body_pose`` (bodies, 7) in world axes."""
         if not self._probes:
             return
-        if _pairs_to_measure(self._table, ghost_world, body_pose):
+        if _look(self._table, ghost_world, body_pose, self.sensed):
             self._measure_pairs(ghost_world)
-        _find_inside(self._table, ghost_world, body_pose, self.sensed)
+            _find_inside(self._table, ghost_world, body_pose, self.sensed)
 
     def _measure_pairs(self, ghost_world: Array) -> None:
         for ghost in np.flatnonzero(self._due.any(axis=1)):
