@@ -196,6 +196,8 @@ class Node:
         """Update heartbeat, watchdogs and diagnostics; False when the physics process has ended."""
         self._ring.beat()
         self._reception.watch(now)
+        for publisher in self._publishers:
+            publisher.flush()
         figures = self._block.figures
         figures["malformed"] = self._reception.rejected + self._arms.rejected + oversized.count
         self._diagnostics.missed = sum(publisher.dropped for publisher in self._publishers) + self._arms.dropped
