@@ -255,6 +255,23 @@ def test_ratios_outside_their_range_are_refused(ready: PsmArm, ratio: float) -> 
     assert ready.joints.ratio_v == 1.0
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_the_common_ratio_is_reported_only_while_both_are_the_same(
+    ready: PsmArm, reported: Reported, seed: int
+) -> None:
+    """As the dVRK does, whose clients read it after each change of either."""
+    rng = np.random.default_rng(seed)
+    v, a = 1.0, 1.0
+    for number in range(1, 20):
+        ratio = float(rng.choice([0.1, 0.25, 1.0]))
+        which = rng.choice(["", "_v", "_a"])
+        getattr(ready, f"trajectory_j_set_ratio{which}")(ratio)
+        v, a = (v if which == "_a" else ratio), (a if which == "_v" else ratio)
+        assert len(reported(ready, "trajectory_j/ratio")) == number
+        assert reported(ready, "trajectory_j/ratio")[-1] == (v if v == a else 0.0)
+        assert (ready.joints.ratio_v, ready.joints.ratio_a) == (v, a)
+
+
 def test_a_lasting_following_error_is_a_fault_that_disable_ends(ready: PsmArm, reported: Reported) -> None:
     ready.servo_jp([0.9, 0, 0.12, 0, 0, 0])
     ready.joints.plant.read()[0, 0] = 0.0

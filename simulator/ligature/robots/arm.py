@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 CHALLENGE = "CRTK"
 """Where the suturing challenge's node has its topics, which `Arm.direct` serves; warnings name them."""
 
+NO_COMMON_RATIO = 0.0
+"""What ``trajectory_j/ratio`` reports while velocities and accelerations have ratios of their own (as in the dVRK)."""
+
 PULL_BACK = 1e-2
 """Damping of the inverse that turns twists into joint velocities: bounded near singular poses."""
 
@@ -498,9 +501,9 @@ class Arm(Device):
                 raise Rejected(f"a ratio must be above 0 and at most 1, not {ratio:g}")
         for axes in self._groups():
             axes.ratio_v, axes.ratio_a = v or axes.ratio_v, a or axes.ratio_a
-        if v is not None and a is not None:
-            self.emit("trajectory_j/ratio", v)
         if v is not None:
             self.emit("trajectory_j/ratio_v", v)
         if a is not None:
             self.emit("trajectory_j/ratio_a", a)
+        both = self.joints.ratio_v, self.joints.ratio_a
+        self.emit("trajectory_j/ratio", both[0] if both[0] == both[1] else NO_COMMON_RATIO)
