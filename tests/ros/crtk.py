@@ -361,8 +361,11 @@ class Console(Link):
         self.listen("teleop/unselected", String)
         self.talk("teleop/enable", Bool, latch=True)
         self.talk("teleop/set_scale", Float64, latch=True)
-        self.talk("teleop/select", String)
-        self.talk("teleop/unselect", String)
+        for topic in ("teleop/select", "teleop/unselect", "teleop/select_teleop", "teleop/unselect_teleop"):
+            self.talk(topic, String)
+        for pedal in CONSOLE_PEDALS:
+            self.listen(pedal, Joy)
+            self.talk(f"emulate_{pedal}", Joy)
 
 
 class System(Link):
@@ -376,6 +379,22 @@ class System(Link):
         self.talk("beep", Float64MultiArray)
         self.talk("string_to_speech", String)
 
+
+class SetupArm(Link):
+    """What ``dvrk.suj`` connects of one arm."""
+
+    def __init__(self, rospy: Any, arm: str) -> None:
+        super().__init__(rospy, f"/SUJ/{arm}")
+        self.listen("operating_state", OperatingState)
+        self.listen("measured_js", JointState)
+        self.listen("measured_cp", PoseStamped)
+        self.listen("local/measured_cp", PoseStamped)
+        self.listen("warning", String)
+        self.talk("state_command", StringStamped, latch=True)
+        self.talk("move_jp", JointState)
+
+
+CONSOLE_PEDALS = ("operator_present", "clutch", "camera", "focus_minus", "focus_plus", "coag", "bicoag")
 
 HEARD = {
     "setpoint_js": JointState, "setpoint_cp": PoseStamped, "measured_js": JointState, "measured_cp": PoseStamped,

@@ -106,6 +106,22 @@ def test_console_system_and_pedals_have_both_ends(simulator, node):
     assert [topic for topic in wanted if not published.get(topic)] == []
 
 
+def test_set_up_joints_have_both_ends_fresh_states_and_reasons(simulator, node):
+    from sensor_msgs.msg import JointState
+
+    from tests.ros.crtk import SetupArm
+
+    for name in ("PSM1", "ECM"):
+        link = SetupArm(node, name)
+        link.check_connections(5.0)
+        assert link.hear("operating_state").state == "ENABLED"
+        stays(lambda link=link: link.hear("operating_state").is_homed, "a fresh state", 1.2)
+        link.send("move_jp", JointState(position=[0.1] * 6))
+        warning = until(lambda link=link: link._heard["warning"].message, "a reason", 5.0).data
+        assert warning == "move_jp: the bases of the arms are fixed; the scene's file places them"
+        link.close()
+
+
 @on_every_arm
 def test_feedback_comes_at_a_hundred_hertz_or_more_with_rising_stamps(arm, listen):
     from sensor_msgs.msg import JointState

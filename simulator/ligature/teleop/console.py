@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import rospy
 from diagnostic_msgs.msg import KeyValue
 from sensor_msgs.msg import Joy
-from std_msgs.msg import Bool, Float64, String
+from std_msgs.msg import Bool, Empty, Float64, String
 
 Put = Callable[[str, Any], None]
 
@@ -37,8 +38,11 @@ class ConsoleTopics:
         self._old_unselected = rospy.Publisher(f"{root}/teleop_psm_unselected", KeyValue, latch=True, queue_size=10)
         self._listen(f"{root}/enable", Bool, lambda m: put("enable", m.data))
         self._listen(f"{root}/set_scale", Float64, lambda m: put("scale", m.data))
-        self._listen(f"{root}/select", String, lambda m: put("select", m.data))
-        self._listen(f"{root}/unselect", String, lambda m: put("unselect", m.data))
+        for word in ("select", "unselect"):
+            for name in (word, f"{word}_teleop"):  # the latter is in the dVRK's documentation
+                self._listen(f"{root}/{name}", String, partial(_hand, put, word))
+        for power_off in ("system/power_off", "console/power_off"):
+            self._listen(prefix + power_off, Empty, lambda _: put("enable", False))
         self._listen(f"{root}/select_teleop_psm", KeyValue, lambda m: put("pair", (m.key, m.value)))
         self._listen(f"{root}/cycle_teleop_psm_by_mtm", String, lambda m: put("cycle", m.data))
         for pedal, topics in PEDALS.items():
@@ -64,6 +68,10 @@ class ConsoleTopics:
     def scaled(self, scale: float) -> None:
         """Report the scale of all pairs."""
         self._scale.publish(scale)
+
+
+def _hand(put: Put, name: str, message: Any) -> None:
+    put(name, message.data)
 
 
 def _pedal(name: str, put: Put) -> Callable[[Any], None]:

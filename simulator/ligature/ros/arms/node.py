@@ -22,15 +22,17 @@ from ligature.bus.events import RUN
 from ligature.model.commands import Command
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import ArmKind, Scene
+from ligature.robots.arm import NO_COMMON_RATIO
 from ligature.robots.commands import ArmCommand
 from ligature.robots.instruments import INSTRUMENTS
 from ligature.ros.arms.bases import CART, BaseFrames
 from ligature.ros.arms.challenge import ChallengeFace
 from ligature.ros.arms.commands import listeners
-from ligature.ros.arms.console import Console, SetupJoints, console_topics, setup_topics
+from ligature.ros.arms.console import Console, console_topics
 from ligature.ros.arms.events import StateStamps
 from ligature.ros.arms.outlet import ArmOutlet, published_topics
 from ligature.ros.arms.rivals import Rival, Rivals
+from ligature.ros.arms.setup_joints import SetupJoints, setup_topics
 from ligature.ros.master import NO_ANSWER
 from ligature.ros.names import tf_topics
 from ligature.ros.publisher import Publisher
@@ -121,7 +123,9 @@ class ArmsNode:
             record = state["arm"][outlet.index]
             outlet.follow(record)
             outlet.events.publish("operating_state", [record["operating"], record["homed"], record["busy"]])
-            outlet.events.publish("trajectory_j/ratio", float(record["ratio"][0]))
+            v, a = record["ratio"].tolist()
+            for name, ratio in (("ratio_v", v), ("ratio_a", a), ("ratio", v if v == a else NO_COMMON_RATIO)):
+                outlet.events.publish(f"trajectory_j/{name}", ratio)
             if outlet.description.kind is ArmKind.PSM and int(record["tool"]) in INSTRUMENTS:
                 outlet.events.publish("tool_type", INSTRUMENTS[int(record["tool"])].type)
         if self._outlets:
@@ -191,6 +195,8 @@ class ArmsNode:
                 outlet.events.beat()
             if self._console is not None:
                 self._console.beat()
+            if self._setup_joints is not None:
+                self._setup_joints.beat()
         if self._challenge is not None:
             self._challenge.publish(now, state, stamp)
         if self._count % TF_PERIODS == 0:
