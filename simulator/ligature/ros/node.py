@@ -38,6 +38,7 @@ from ligature.ros.reception import Reception
 from ligature.ros.registrations import dead_neighbours
 from ligature.ros.schedule import Key, Outlet, Schedule
 from ligature.ros.start import start_node
+from ligature.ros.unserved import Unserved
 
 DEFAULT_LOW, DEFAULT_HIGH = 50, 1000
 PLUGIN_HZ = 200
@@ -88,7 +89,9 @@ class Node:
         self._diagnostics = Diagnostics(self._block, lambda: tissue.statuses(scene, self._state[0]))
         self._placed = {outlet.key: outlet.template for outlet in outlets if outlet.key[0] in ("camera", "light")}
         self._ready = rospy.Publisher(f"{scene.world.root}ligature/ready", Bool, queue_size=1, latch=True)
-        self._master = MasterWatch(Parameters(scene, self._adopt).poll)
+        self._parameters = Parameters(scene, self._adopt)
+        self._unserved = Unserved(scene.world.root, [arm.name for arm in scene.arms])
+        self._master = MasterWatch(self._look_at_master)
 
     def run(self, stop: Stop, on_first: Callable[[], None]) -> None:
         """Publish until ``stop`` is set or the physics process is gone."""
@@ -117,6 +120,11 @@ class Node:
                 if not ready and self._state["update"][0] > 0:  # the first state is there before physics has started
                     ready = True
                     self._ready.publish(True)
+
+    def _look_at_master(self) -> None:
+        """What the watch of the master does at every look."""
+        self._parameters.poll()
+        self._unserved.poll(time.monotonic())
 
     def _advertise(self, min_hz: int | None, max_hz: int | None, policy: str) -> list[Outlet]:
         """An outlet for the world and one for every object that the name policy lets be seen."""
