@@ -22,7 +22,9 @@ LINES = [
 
 def functions(file: str) -> set[str]:
     """Names of a module's test functions."""
-    tree = ast.parse((ROOT / "tests" / "ros" / file).read_text())
+    found = [path for folder in ("ros", "robots") if (path := ROOT / "tests" / folder / file).exists()]
+    assert len(found) == 1, f"{file}: {len(found)} modules of this name"
+    tree = ast.parse(found[0].read_text())
     return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")}
 
 
