@@ -10,6 +10,8 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from types import SimpleNamespace
+from typing import Any
+from xmlrpc.client import ServerProxy
 
 import pytest
 
@@ -142,3 +144,52 @@ def test_a_client_that_dies_in_the_middle_of_a_message_is_given_up(
         assert reading.recv(len(DATA), socket.MSG_WAITALL) == DATA
     assert gone.closed is (manner != "half")
     assert bool(delivery._rests) is (manner == "half")
+
+
+@pytest.mark.ros
+def test_viewers_that_die_in_the_middle_of_a_picture_cost_the_others_none(node: Any) -> None:
+    """Killed, half closed, suspended: the camera node goes on, and others get the newest picture."""
+    from ligature.ros.cameras import _advertise
+    from sensor_msgs.msg import Image
+
+    from tests.ros.test_rude_clients import header
+
+    topic, data = "/test_dying_viewers/ImageData", bytes(4_000_000)
+    publisher, seen = _advertise(topic, Image), []
+    good = node.Subscriber(topic, Image, lambda message: seen.append(int(message.height)), queue_size=1)
+    _, _, (_, host, port) = ServerProxy(node.get_node_uri()).requestTopic("/viewer", topic, [["TCPROS"]])  # type: ignore[misc]
+    viewers = [socket.create_connection((host, port)) for _ in range(4)]
+    for name, viewer in enumerate(viewers):
+        viewer.sendall(header({"topic": topic, "type": "*", "md5sum": "*", "callerid": f"/viewer{name}"}))
+    until(lambda: publisher.get_num_connections() == 5, lambda: f"{publisher.get_num_connections()} of 5", 20.0)
+    longest, number = 0.0, 0
+
+    def show() -> None:
+        nonlocal longest, number
+        number, begin = number + 1, time.monotonic()
+        publisher.publish(Image(height=number, data=data))
+        longest = max(longest, time.monotonic() - begin)
+
+    def sees(what: str) -> None:
+        until(lambda: seen and seen[-1] == number, what, 10.0)
+
+    show()
+    sees("the first picture")
+    assert all(len(viewer.recv(100_000)) > 0 for viewer in viewers)
+    killed, closed, half, _suspended = viewers
+    killed.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    killed.close()
+    closed.close()
+    half.shutdown(socket.SHUT_WR)
+    for _ in range(6):
+        show()
+        sees(f"picture {number}")
+    until(lambda: publisher.get_num_connections() <= 3, "who is gone is given up", 10.0)
+    for viewer in viewers[2:]:
+        viewer.close()
+    show()
+    until(lambda: publisher.get_num_connections() == 1, "one viewer is left", 10.0)
+    sees("the last picture")
+    assert longest < 1.0, f"publishing took {longest:.2f} s"
+    good.unregister()
+    publisher.unregister()
