@@ -341,6 +341,32 @@ def _random_bite(kit, seed):
     return leap, needle
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_needle_drawn_out_across_its_path_is_let_go_by_and_by(kit, seed):
+    """Of any mass, on any spring, at any speed: the hold across does not vanish at once with the last node.
+
+    It fades within `DROP`, or with the needle's way back to where its spring draws it; at once, it threw a light needle.
+    """
+    rng = np.random.default_rng(seed)
+    block = kit.pad(MATERIAL)
+    needle = _down(
+        kit, block, tilt=rng.uniform(-0.5, 0.5), mass=10 ** rng.uniform(-6, -3), stiffness=10 ** rng.uniform(2.7, 3.7)
+    )
+    needle.advance(rng.uniform(3e-3, 7e-3), 0.05)
+    angle, aside = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.5e-3, 1.5e-3)
+    way = np.cos(angle) * needle.axes[:, 1] + np.sin(angle) * needle.axes[:, 2]
+    for _ in range(60):
+        needle.goal = needle.goal + aside / 60 * way
+        needle.rest(1)
+    step, across = 10 ** rng.uniform(-5.0, -3.7), []
+    while needle.needle.passages:
+        needle.advance(-step, 1.0)
+        force = needle.wrench[:3]
+        across.append(float(np.linalg.norm(force - (force @ needle.R[:, 0]) * needle.R[:, 0])))
+    assert max(across) > 0.05
+    assert (-np.diff([*across, 0.0])).max() < 0.3 * max(across)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_random_paths_never_leap(kit, seed):
     leap, _ = _random_bite(kit, seed)

@@ -45,7 +45,7 @@ HYSTERESIS = 5e-4
 """Length in metres by which a tip may stand before a node and still be held by it."""
 
 LEFT = 5e-3
-"""Force in newtons below which a tip that leaves is out."""
+"""Force in newtons below which a tip that leaves is out, or has left a node behind that it was drawn back from."""
 
 LEAST_SHARE = 8e-4
 """Length in metres for which a node holds across at least."""
@@ -156,6 +156,13 @@ def _behind(shape: Array, x: float, y: float, z: float) -> float:
     return angle / k
 
 
+@inlined
+def _fades(held: Held, i: int, sigma: float) -> bool:
+    """Whether a tip ``sigma`` beyond node ``i`` was drawn back from it, which still holds it across."""
+    f = held.across[i]
+    return sigma < -HYSTERESIS and f[0] * f[0] + f[1] * f[1] + f[2] * f[2] > LEFT * LEFT
+
+
 @kernel
 def engage(points: Points, paths: Paths, held: Held, shape: Array) -> None:
     """Which nodes of its paths hold the needle, and for how much of its length."""
@@ -171,7 +178,7 @@ def engage(points: Points, paths: Paths, held: Held, shape: Array) -> None:
             y = points.at[i]
             sigma = _behind(shape, y[0], y[1], y[2])
             margin = HYSTERESIS if held.engaged[i] else 0.0
-            within = -margin <= sigma <= shape[10] + margin
+            within = -margin <= sigma <= shape[10] + margin or (held.engaged[i] == 1 and _fades(held, i, sigma))
             if within and not held.engaged[i]:
                 qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, sigma)
                 dx, dy, dz = qx - y[0], qy - y[1], qz - y[2]
@@ -188,7 +195,7 @@ def engage(points: Points, paths: Paths, held: Held, shape: Array) -> None:
             if not within:
                 for a in range(3):
                     points.force[i, a] = 0.0
-            else:
+            elif sigma >= -HYSTERESIS:
                 first = k if first < 0 else first
                 last = k
         for k in range(count):
@@ -196,6 +203,9 @@ def engage(points: Points, paths: Paths, held: Held, shape: Array) -> None:
             if not held.engaged[i]:
                 continue
             s, sigma = paths.s[p, k], held.sigma[i]
+            if sigma < -HYSTERESIS:
+                held.share[i] = 0.0
+                continue
             tail = shape[10] - sigma
             before = min(s, tail if sense > 0 else sigma)
             after = min(paths.length[p] - s, sigma if sense > 0 else tail)
@@ -297,9 +307,10 @@ def _hold_across(
 
 
 @inlined
-def _hold_node(points: Points, held: Held, rows: Bristles, shape: Array, i: int, m: int) -> int:
+def _hold_node(points: Points, held: Held, rows: Bristles, shape: Array, i: int, m: int, dt: float) -> int:
     """Rows of a node that the needle passes: friction along it, the hold across; returns the number of the next row."""
-    qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, held.sigma[i])
+    # A node that the tip was drawn back from still holds it for a while, but no needle is there.
+    qx, qy, qz, tx, ty, tz, nx, ny, nz = _along(shape, max(held.sigma[i], -HYSTERESIS))
     rx, ry, rz = qx - shape[11], qy - shape[12], qz - shape[13]
     bx, by, bz = rows.base[i, 0], rows.base[i, 1], rows.base[i, 2]
     # Along: what friction holds, and how the tissue moves by itself.
@@ -313,14 +324,16 @@ def _hold_node(points: Points, held: Held, rows: Bristles, shape: Array, i: int,
     fx, fy, fz = held.across[i, 0], held.across[i, 1], held.across[i, 2]
     along = fx * tx + fy * ty + fz * tz
     fx, fy, fz = fx - along * tx, fy - along * ty, fz - along * tz
-    size = math.sqrt(fx * fx + fy * fy + fz * fz)
-    if size > 1e-9:
-        nx, ny, nz = fx / size, fy / size, fz / size
+    pressed = math.sqrt(fx * fx + fy * fy + fz * fz)
+    if pressed > 1e-9:
+        nx, ny, nz = fx / pressed, fy / pressed, fz / pressed
     offset, torn = held.offset[i], held.torn[i]
     ox, oy, oz = offset[0] + torn[0], offset[1] + torn[1], offset[2] + torn[2]
     away = (qx - bx - ox, qy - by - oy, qz - bz - oz)
     # A node that has just been passed stands for no length yet; it tears no sooner than half of the others.
     limit = points.strength[i] * max(held.share[i], LEAST_SHARE)
+    if held.sigma[i] < -HYSTERESIS:
+        limit = min(limit, pressed * math.exp(-dt / DROP))
     t, n, arm = (tx, ty, tz), (nx, ny, nz), (rx, ry, rz)
     return _hold_across(rows, m + 1, ACROSS, i, t, n, arm, away, limit, points.soft[i], held.side[i])
 
@@ -384,14 +397,14 @@ def _fill_compliance(points: Points, rows: Bristles, m: int) -> None:
 
 
 @kernel
-def gather(points: Points, paths: Paths, held: Held, rows: Bristles, shape: Array, s: float) -> int:
-    """Make the rows of a tick; returns how many."""
+def gather(points: Points, paths: Paths, held: Held, rows: Bristles, shape: Array, s: float, dt: float) -> int:
+    """Make the rows of a tick of ``dt`` seconds; returns how many."""
     m = 0
     _find_bases(points, held, rows, s)
     for u in range(points.filled[0]):
         i = points.used[u]
         if held.engaged[i] != 0:
-            m = _hold_node(points, held, rows, shape, i, m)
+            m = _hold_node(points, held, rows, shape, i, m, dt)
     where = held.tip[0]
     if where in (CUTS, TENTS, LEAVES):
         m = _cut_ahead(points, paths, held, rows, shape, m)
@@ -433,9 +446,11 @@ def conclude(points: Points, paths: Paths, held: Held, rows: Bristles, m: int, d
         elif kind == ACROSS:
             held.side[i, turn] = rows.side[a]
             held.load[2] += abs(force)
+            # What fades where the tip was drawn back tears nothing.
+            beyond = held.offset if held.sigma[i] < -HYSTERESIS else held.torn
             for b in range(3):
                 held.across[i, b] += force * rows.e[a, b]
-                held.torn[i, b] += excess * rows.e[a, b]
+                beyond[i, b] += excess * rows.e[a, b]
         elif kind == TIP:
             held.tip_side[0] = rows.side[a]
             held.load[0] = force
@@ -462,7 +477,7 @@ def couple(tissue: Integers, needle: Integers, dt: float) -> tuple[int, int]:
     points, paths, held, rows = t.points, t.paths, n.held, n.rows
     engage(points, paths, held, n.shape)
     left = follow_tip(points, paths, held, dt)
-    m = gather(points, paths, held, rows, n.shape, (t.field.clock[0] + 1) / t.field.clock[1])
+    m = gather(points, paths, held, rows, n.shape, (t.field.clock[0] + 1) / t.field.clock[1], dt)
     if solve_rows(rows, m, n.H, n.g, n.delta) < 0:
         return left, -1
     through = conclude(points, paths, held, rows, m, n.delta, True)
@@ -481,7 +496,7 @@ def begin_coupling(tissue: Integers, needle: Integers, dt: float) -> tuple[int, 
     points, paths, held, rows = t.points, t.paths, n.held, n.rows
     engage(points, paths, held, n.shape)
     left = follow_tip(points, paths, held, dt)
-    m = gather(points, paths, held, rows, n.shape, (t.field.clock[0] + 1) / t.field.clock[1])
+    m = gather(points, paths, held, rows, n.shape, (t.field.clock[0] + 1) / t.field.clock[1], dt)
     found = solve_rows(rows, m, n.H, n.g, n.delta)
     if found < 0 or (found == 0 and reduce_rows(rows, m) < 0):
         return left, -1
