@@ -135,7 +135,7 @@ def _one_step(
     nodes, joints, work, constants = rod.nodes, rod.joints, rod.work, rod.constants
     n, total, elements = joints.load.shape[0] + 1, nodes.mass.shape[0], work.segment.shape[0]
     new.count[0] = 0
-    add_point_constraints(nodes, work, old, new, constraints, points)
+    add_point_constraints(nodes, work, old, new, constraints, points, constants.stiffness[0], share)
     detect(
         constants.first[0], elements, nodes, rod.shapes, old, new, work, rod.tension, rod.counts,
         constants.self_skip[0], h,
