@@ -84,7 +84,11 @@ CACHES: dict[str, str] = {
         ),
         "written before it is read in every tick",
     ),  # fmt: skip
-    "ImpulseExchange._solvers": "scratch of a tick",
+    "ImpulseExchange._exchanges": "what of it lasts are attributes of the grasps, too",
+    "Grasps._holds": "what of it lasts are attributes of the grasps, too",
+    **dict.fromkeys(("Grasps.look_table", "Looks.due", "Looks.box"), "set before compiled code reads it"),
+    **dict.fromkeys(("CourseArrays.due", "CourseArrays.watched"), "set before compiled code reads it"),
+    **dict.fromkeys(("Courses.table", "CourseArrays.own", "CourseArrays.aim"), "addresses of arrays"),
     "Rod._spring_table": "addresses of arrays",
     "Rod.springs": "written by every tick that tissue takes part in",
     # soft tissue

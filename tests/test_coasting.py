@@ -11,6 +11,8 @@ import numpy as np
 import pybullet
 import pytest
 from ligature import Simulation
+from ligature.environments.experts import demonstrate
+from ligature.environments.suturing import SuturingEnv
 from ligature.model.commands import BodyCommand, Command, CommandType, Release, WatchContacts
 from ligature.model.scene import Scene
 from ligature.robots.commands import Adopt, MoveJr, ServoJr, ServoJv
@@ -154,6 +156,42 @@ def test_a_thread_that_coasts_has_the_bits_of_one_that_does_not(
                 simulation.restore(simulation.snapshot())
         assert len({simulation.state_hash() for simulation in runs}) == 1, (k, commands, ticks)
     assert passed[0] > 60
+
+
+def _demonstrated(task: str, seed: int, noise: float, coasts: bool) -> tuple[list[str], int]:
+    """State hashes of an episode, and ticks that coasted while a jaw held something."""
+    env = SuturingEnv(task, max_steps=180)
+    simulation, hashes, carried = env.simulation, list[str](), 0
+    coast = simulation._coasting.pass_ticks
+
+    def counted(ticks: int, begins: bool = False) -> tuple[int, int]:
+        nonlocal carried
+        passed, begun = coast(ticks, begins) if coasts else (0, 0)
+        carried += passed if any(held is not None for held in simulation.grasps.values()) else 0
+        return passed, begun
+
+    def look(*_: object) -> None:
+        hashes.append(simulation.state_hash())
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simulation._coasting, "pass_ticks", counted)
+        demonstrate(env, seed, noise, look, slips=True)
+        for _ in range(8):  # the jaws open
+            env.step(np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0], dtype=np.float32))
+            look()
+    env.close()
+    return hashes, carried
+
+
+@pytest.mark.parametrize(
+    ("task", "seed", "noise"), [("pick", 0, 0.05), ("insert", 0, 0.6), ("insert", 1, 0.6), ("peg_transfer", 0, 0.02)]
+)
+def test_jaws_that_search_hold_and_let_go_while_coasting_have_the_bits_of_those_that_do_not(
+    task: str, seed: int, noise: float
+) -> None:
+    hashes, carried = _demonstrated(task, seed, noise, True)
+    assert hashes == _demonstrated(task, seed, noise, False)[0]
+    assert carried > 100
 
 
 def test_a_coast_ends_in_the_tick_in_which_other_bodies_come_near_a_thread(

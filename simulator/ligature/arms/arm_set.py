@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ligature.adf import Diagnostic
+from ligature.arms.courses import WATCH_PERIOD, Courses
 from ligature.arms.ecm import build_ecm
 from ligature.arms.mtm import build_mtm
 from ligature.arms.psm import build_psm
@@ -20,10 +24,9 @@ from ligature.robots.commands import ArmCommand
 from ligature.robots.mtm_arm import MtmArm
 from ligature.robots.operating_state import Rejected
 
-_BUILDERS = {ArmKind.PSM: build_psm, ArmKind.ECM: build_ecm, ArmKind.MTM: build_mtm}
+Integers = NDArray[np.int64]
 
-WATCH_PERIOD = 5
-"""Ticks between two checks of following errors."""
+_BUILDERS = {ArmKind.PSM: build_psm, ArmKind.ECM: build_ecm, ArmKind.MTM: build_mtm}
 
 
 class ArmSet(Subsystem, Mapping[str, Arm]):
@@ -52,7 +55,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
             self._arms.append(_BUILDERS[description.kind](scene, world, description, self.problems))
         self._by_name = {arm.name: arm for arm in self._arms}
         self._masters = [(m, arm) for m, arm in enumerate(self._arms) if isinstance(arm, MtmArm)]
-        self._records = ArmRecords(self._arms)
+        self._records, self._courses = ArmRecords(self._arms), Courses(self._arms)
 
     def __getitem__(self, name: str) -> Arm:
         if name not in self._by_name:
@@ -108,17 +111,19 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
                 self._guarded("following-error check", arm, arm.watch, WATCH_PERIOD * self._dt)
 
     def idle_ticks(self, tick: int) -> int:
-        """The ticks until following errors are checked, while all arms stay at their set-points.
+        """Always while all arms stay at their set-points, as long as compiled code finds that none `strays`.
 
-        A check now that would find nothing is none, and arms without set-points are not checked.
+        While an arm is away from its set-point, the ticks until it is checked.
         """
         if not all(arm.is_idle for arm in self._arms):
             return 0
-        watched = [arm for arm in self._arms if arm.is_watched]
-        if not watched:
-            return ALWAYS
         left = WATCH_PERIOD - 1 - tick % WATCH_PERIOD
-        return WATCH_PERIOD if left == 0 and all(arm.is_on_course for arm in watched) else left
+        return ALWAYS if self._courses.watch(left) else left
+
+    @property
+    def course_table(self) -> Integers:
+        """What `strays` takes; empty without arms."""
+        return self._courses.table
 
     def pass_idle(self, ticks: int) -> None:
         """Count the time of all arms."""
@@ -166,7 +171,7 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         """Continue from `snapshot`."""
         for arm, state in zip(self._arms, snapshot, strict=True):
             arm.restore(state)
-        self._records = ArmRecords(self._arms)
+        self._records, self._courses = ArmRecords(self._arms), Courses(self._arms)
 
 
 def _words(error: Exception) -> str:

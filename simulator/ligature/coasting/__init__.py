@@ -1,4 +1,4 @@
-"""Advances bodies and threads over several ticks in one compiled call: nothing else has work in them.
+"""Advances bodies, threads and what jaws hold over several ticks in one compiled call: nothing else has work in them.
 
 Calls of Python within a tick cost more than what they compute, for Bullet and the threads evict Python from the caches.
 Every other subsystem has stated that it is idle; see `ligature.model.subsystem.Subsystem.idle_ticks`.
@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ligature.arms import ArmSet
 from ligature.coasting.clock import clock
 from ligature.coasting.ticks import coast
+from ligature.grasping import NOTHING, Grasps
 from ligature.physics import World
 from ligature.physics.divergence import MAX_SPEED
 from ligature.suture import Suture
@@ -28,8 +30,8 @@ class Coasting:
         (3,) seconds of the last call, by `PHASES`.
     """
 
-    def __init__(self, world: World, suture: Suture) -> None:
-        self._world, self._suture, self._dt = world, suture, world.dt
+    def __init__(self, world: World, suture: Suture, grasps: Grasps, arms: ArmSet) -> None:
+        self._world, self._suture, self._grasps, self._arms, self._dt = world, suture, grasps, arms, world.dt
         self.spent, self._corners, self._clock = np.zeros(len(PHASES)), np.zeros((2, 3)), clock()
         # loads the kernels now: a run would stand still for them
         if suture.rods.rods:
@@ -61,12 +63,14 @@ class Coasting:
         return passed, begun
 
     def _coast(self, ticks: int, begins: bool = False) -> tuple[int, int, bool]:
-        world, rods = self._world, self._suture.rods
+        world, rods, masses = self._world, self._suture.rods, self._world.masses
         threads = (
-            world.impulses.total, world.commands.drives, rods.colliders.table, rods.colliders.indices,
+            world.commands.drives, rods.colliders.table, rods.colliders.indices,
             rods.tick_tables(), self._corners,
         ) if rods.rods else None  # fmt: skip
         return coast(
-            *world.always, world.impulses.acted, self._suture.holes.search_table, self._clock, self.spent, self._dt,
-            MAX_SPEED, ticks, int(begins), threads,
+            *world.always, world.impulses.total, world.impulses.acted, self._suture.holes.search_table,
+            *(self._grasps.carried() if ticks else (NOTHING, NOTHING)), masses.laden, masses.lifts,
+            self._arms.course_table, self._grasps.look_table, self._clock, self.spent, self._dt, MAX_SPEED, ticks,
+            int(begins), threads,
         )  # fmt: skip

@@ -2,6 +2,6 @@
 
 from ligature.grasping.actuator_attachments import ActuatorAttachments
 from ligature.grasping.actuator_grasps import ActuatorGrasps
-from ligature.grasping.grasps import Grasps, Held
+from ligature.grasping.grasps import NOTHING, Grasps, Held
 
-__all__ = ["ActuatorAttachments", "ActuatorGrasps", "Grasps", "Held"]
+__all__ = ["NOTHING", "ActuatorAttachments", "ActuatorGrasps", "Grasps", "Held"]

@@ -5,15 +5,17 @@ World axes, SI units.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.grasping.fingers import EFFORT, LEAST_LEVER, STIFFNESS
 from ligature.grasping.friction import grasp_arrays, motions, open_motions, predict_free, scratch, solve
 from ligature.kernels import inlined, kernel
-from ligature.physics.axes import asked_of, axes, open_axes, stop_at
+from ligature.physics.axes import Axes, asked_of, axes, open_axes, stop_at
 from ligature.physics.trees import Places, Trees, bring_up, load, open_places, open_trees, trees
-from ligature.tables import table_of
+from ligature.tables import opener, table_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -29,34 +31,92 @@ RELEASED, AFRESH, CREPT = 1, 2, 4
 """What `keep` finds: the jaw lets go; a finger was not stopped before; the body has slipped by `CREEP`."""
 
 
-@kernel
-def keep(
-    handle: int, tree_table: Integers, place_table: Integers, axis_table: Integers, palm: int, fingers: Integers,
-    opening: Array, levers: Array, positions: Array, palm_at: Array, pads: Array, slid: Array, checked: float,
-) -> int:  # fmt: skip
-    """Press the pads of a jaw by the efforts that the commands of its ``fingers`` (2,), axes of the world, ask for.
+class Hold(NamedTuple):
+    """A jaw that holds a body."""
 
-    ``opening`` (2,) are the directions in which they open, ``levers``, ``positions`` (2,), ``palm_at`` (3,)
-    and ``checked`` of a `JawGrasp`, ``pads`` (3,) and ``slid`` (2,) those of its grasp. Returns the sum of what it
-    finds; a jaw that lets go is left as it is.
-    """
-    trees, places, axes = open_trees(tree_table), open_places(place_table), open_axes(axis_table)
+    palm: Integers  # (1,) the body of the pads
+    fingers: Integers  # (2,) axes of the world that turn them
+    opening: Array  # (2,) the directions in which they open
+    levers: Array  # (2,), and so on as in a `JawGrasp`
+    positions: Array  # (2,)
+    palm_at: Array  # (3,)
+    checked: Array  # (1,)
+    pads: Array  # (3,) of its grasp
+    slid: Array  # (2,)
+
+
+class Exchanged(NamedTuple):
+    """The grasps of a body, for `exchange`; groups of arrays are tables."""
+
+    motions: Integers
+    grasps: Integers
+    room: Integers
+    mass: Array  # (2,) of the body now, and its own
+    inertia: Array  # (3,) now
+    gravity: Array  # (3,) of its own mass
+    laden: Flags  # (1,) whether the difference moves with its holders
+
+
+_whole, _real = np.zeros(1, np.int64), np.zeros(1)
+open_hold = opener(Hold(_whole, _whole, *[_real] * 7))
+open_exchanged = opener(Exchanged(_whole, _whole, _whole, _real, _real, _real, np.zeros(1, np.bool_)))
+
+
+@inlined
+def _press(axes: Axes, trees: Trees, held: Hold) -> float:
+    """Force between the fingers of a jaw, by the efforts that their commands ask for."""
     force = np.inf
     for side in range(2):
-        effort = min(-opening[side] * asked_of(axes, trees, fingers[side], STIFFNESS), EFFORT)
-        force = min(force, effort / max(levers[side], LEAST_LEVER))
-    row, jumped = places.row[palm], False
-    bring_up(handle, trees, places.tree[palm], places.link[palm] >= 0)
+        effort = min(-held.opening[side] * asked_of(axes, trees, held.fingers[side], STIFFNESS), EFFORT)
+        force = min(force, effort / max(held.levers[side], LEAST_LEVER))
+    return force
+
+
+@inlined
+def _jumped(trees: Trees, row: int, palm_at: Array) -> bool:
+    """Whether a palm was put elsewhere since the last tick."""
+    jumped = False
     for a in range(3):
         jumped = jumped or abs(trees.pose[row, a] - palm_at[a]) > JUMP
-    if not force > 0.0 or jumped:
+    return jumped
+
+
+@kernel
+def keeps(handle: int, tree_table: Integers, place_table: Integers, axis_table: Integers, holds: Integers) -> bool:
+    """Whether `keep` would find nothing for any of the jaws of ``holds`` (j, words), tables of a `Hold`."""
+    trees, places, axes = open_trees(tree_table), open_places(place_table), open_axes(axis_table)
+    for j in range(holds.shape[0]):
+        held = open_hold(holds[j])
+        palm = held.palm[0]
+        bring_up(handle, trees, places.tree[palm], places.link[palm] >= 0)
+        released = not _press(axes, trees, held) > 0.0 or _jumped(trees, places.row[palm], held.palm_at)
+        afresh = not (axes.stopped[held.fingers[0]] and axes.stopped[held.fingers[1]])
+        if released or afresh or held.slid[0] > held.checked[0] + CREEP:
+            return False
+    return True
+
+
+@kernel
+def keep(handle: int, tree_table: Integers, place_table: Integers, axis_table: Integers, hold_table: Integers) -> int:
+    """Press the pads of a jaw by the efforts that the commands of its fingers ask for.
+
+    ``hold_table`` is that of a `Hold`. Returns the sum of what it finds; a jaw that lets go is left as it is.
+    """
+    trees, places, axes = open_trees(tree_table), open_places(place_table), open_axes(axis_table)
+    held = open_hold(hold_table)
+    palm, force = held.palm[0], _press(axes, trees, held)
+    row = places.row[palm]
+    bring_up(handle, trees, places.tree[palm], places.link[palm] >= 0)
+    if not force > 0.0 or _jumped(trees, row, held.palm_at):
         return RELEASED
-    found = CREPT if slid[0] > checked + CREEP else 0
-    pads[2] = force
+    found = CREPT if held.slid[0] > held.checked[0] + CREEP else 0
+    held.pads[2] = force
     for a in range(3):
-        palm_at[a] = trees.pose[row, a]
+        held.palm_at[a] = trees.pose[row, a]
     for side in range(2):
-        if stop_at(axes, trees, fingers[side], positions[side], -opening[side] * (force * levers[side])):
+        if stop_at(
+            axes, trees, held.fingers[side], held.positions[side], -held.opening[side] * (force * held.levers[side])
+        ):
             found |= AFRESH
     trees.quiet[places.tree[palm]] = False
     return found
@@ -75,32 +135,30 @@ def _read(handle: int, trees: Trees, places: Places, body: int, pose: Array, twi
 
 @kernel
 def exchange(
-    handle: int, tree_table: Integers, place_table: Integers, total: Array, acted: Flags, motion_table: Integers,
-    grasp_table: Integers, room_table: Integers, mass: float, inertia: Array, own_mass: float, gravity: Array,
-    laden: bool, dt: float,
-) -> None:  # fmt: skip
+    handle: int, tree_table: Integers, place_table: Integers, total: Array, acted: Flags, table: Integers, dt: float
+) -> None:
     """Exchange the impulses of the coming tick between a body and its holders: `Motions.bodies`.
 
-    ``mass`` and ``inertia`` (3,) are those of the body now, ``own_mass`` and ``gravity`` (3,) its own; with ``laden``,
-    the difference moves with its holders. ``total`` and ``acted`` of `ligature.physics.impulses` are updated. With a
+    ``table`` is that of what is `Exchanged`; ``total`` and ``acted`` of `ligature.physics.impulses` are updated. With a
     handle, Bullet gets the impulses; without one the trees must have been read.
     """
-    trees, places, moves = open_trees(tree_table), open_places(place_table), open_motions(motion_table)
+    trees, places, held = open_trees(tree_table), open_places(place_table), open_exchanged(table)
+    moves = open_motions(held.motions)
     body = moves.bodies[0]
     _read(handle, trees, places, body, moves.body_pose, moves.body_twist)
     for g in range(moves.palm_pose.shape[0]):
         _read(handle, trees, places, moves.bodies[1 + g], moves.palm_pose[g], moves.palm_twist[g])
-    moves.inverse[0] = 1.0 / mass
+    moves.inverse[0] = 1.0 / held.mass[0]
     for a in range(3):
-        moves.inverse[1 + a] = 1.0 / inertia[a]
+        moves.inverse[1 + a] = 1.0 / held.inertia[a]
     for a in range(6):
         moves.pending[a] = total[body, a] if acted[body] else 0.0
-    predict_free(motion_table, room_table, own_mass, gravity, dt)
-    if handle != 0 and laden:
+    predict_free(held.motions, held.room, held.mass[1], held.gravity, dt)
+    if handle != 0 and held.laden[0]:
         for a in range(6):
             trees.wanted[a] = moves.attached_load[a]
         load(handle, trees, places, body)
-    solve(motion_table, grasp_table, room_table, dt)
+    solve(held.motions, held.grasps, held.room, dt)
     for i in range(moves.bodies.shape[0]):
         at = moves.bodies[i]
         for a in range(6):
@@ -111,13 +169,35 @@ def exchange(
             load(handle, trees, places, at)
 
 
+@inlined
+def carry(
+    handle: int, tree_table: Integers, place_table: Integers, axis_table: Integers, total: Array, acted: Flags,
+    holds: Integers, exchanges: Integers, dt: float,
+) -> bool:  # fmt: skip
+    """Do what jaws do in a tick in which each holds on to its body; False, and nothing, where one may not.
+
+    The tables are those of a `Hold` for each jaw, and of what is `Exchanged` for each body.
+    """
+    if holds.shape[0] == 0:
+        return True
+    if not keeps(handle, tree_table, place_table, axis_table, holds):
+        return False
+    for j in range(holds.shape[0]):
+        keep(handle, tree_table, place_table, axis_table, holds[j])
+    for b in range(exchanges.shape[0]):
+        exchange(handle, tree_table, place_table, total, acted, exchanges[b], dt)
+    return True
+
+
 def warm_up() -> None:
     """Compile the kernels or load them from the cache, so that the first grasp of a run does not wait."""
     group, places, laws = trees(1, 1, 2), Places(*np.array([[0], [0], [0], [-1]])), axes(1, 2)  # tables need them alive
     moves, held, room = motions(1), grasp_arrays(1), scratch(1)
     here, place = table_of(group), table_of(places)
-    both, one, zero = np.zeros(2, dtype=np.int64), np.ones(2), np.zeros(3)
-    keep(0, here, place, table_of(laws), 0, both, one, one, one, zero, zero, zero[:2], 0.0)
-    total, acted = np.zeros((1, 6)), np.zeros(1, np.bool_)
+    zero, one = np.zeros(3), np.ones(3)
+    hold = Hold(np.zeros(1, np.int64), np.zeros(2, np.int64), one[:2], one[:2], one[:2], one, zero[:1], zero, zero[:2])
+    keep(0, here, place, table_of(laws), table_of(hold))
+    moves, held, room = motions(1), grasp_arrays(1), scratch(1)
     tables = table_of(moves), table_of(held), table_of(room)
-    exchange(0, here, place, total, acted, *tables, 1.0, np.ones(3), 1.0, zero, False, 1e-3)
+    exchanged = Exchanged(*tables, one[:2], one, zero, np.zeros(1, np.bool_))
+    exchange(0, here, place, np.zeros((1, 6)), np.zeros(1, np.bool_), table_of(exchanged), 1e-3)

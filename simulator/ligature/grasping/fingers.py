@@ -66,7 +66,7 @@ class Fingers:
     def __init__(self, jaw: Jaw, world: World) -> None:
         self.jaw, self._world = jaw, world
         self.axes = np.array([world.joints.axis(joint) for joint in jaw.joints])
-        self.opening = np.array(jaw.opening)
+        self.opening = np.array(jaw.opening, dtype=float)
         self._slowed = False
 
     def axis(self) -> tuple[Array, Array]:

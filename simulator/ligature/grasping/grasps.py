@@ -8,7 +8,7 @@ and the force between them follows from the efforts that their commands request.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from ligature.grasping import thread_grasps
 from ligature.grasping.actuator_grasps import ActuatorGrasps
-from ligature.grasping.exchange import AFRESH, CREPT, RELEASED, keep, warm_up
+from ligature.grasping.exchange import AFRESH, CREPT, RELEASED, Hold, keep, warm_up
 from ligature.grasping.fingers import TOUCH, Facing, Fingers
 from ligature.grasping.grasp import Patch
 from ligature.grasping.impulses import BodyGrasp, ImpulseExchange, begin
+from ligature.grasping.looking import SEARCH_PERIOD, Looks, looks
 from ligature.model.frames import inverse, pose7_matrix
 from ligature.model.lookup import UnknownNameError
 from ligature.model.scene import Jaw, Scene
@@ -28,11 +29,13 @@ from ligature.model.subsystem import ALWAYS, Subsystem, kept, put_back
 from ligature.physics import World
 from ligature.suture import Rods
 from ligature.suture.partners import JawPads
+from ligature.tables import table_of
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
-SEARCH_PERIOD = 5
-"""Ticks between two searches for bodies between open fingers."""
+NOTHING: Integers = np.zeros((0, 1), dtype=np.int64)
+"""No tables."""
 
 PRESENT = 0.3e-3
 """Sum of the gaps of both pads, in metres, beyond which they have lost the body."""
@@ -61,13 +64,13 @@ class JawGrasp(BodyGrasp):
 
     ``levers`` (2,) in metres are those of the pads about the axis of the fingers, ``positions`` (2,) in radians the
     joint positions at which the fingers stop, ``palm_at`` (3,) the position of the palm in the last tick, and
-    ``checked`` (m) the slip at the last check.
+    ``checked`` (1,) the slip in metres at the last check.
     """
 
     levers: Array
     positions: Array
     palm_at: Array
-    checked: float = 0.0
+    checked: Array = field(default_factory=lambda: np.zeros(1))
 
 
 class Grasps(Subsystem, Mapping[str, Held | None]):
@@ -103,6 +106,14 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._disabled: list[list[int]] = [[] for _ in scene.jaws]
         self._near = [False for _ in scene.jaws]
         self._impulses = ImpulseExchange(world)
+        self._holds: list[tuple[JawGrasp, Hold, Integers] | None] = [None for _ in scene.jaws]
+        """Tables of the jaw grasps, for compiled code."""
+        self._looked_at: object = None
+        self.look_table: Integers = np.zeros(0, np.int64)
+        """What `may_grasp` takes."""
+        self._looking: list[bool] = []
+        """Whether the boxes of a jaw's fingers are known."""
+        self._look()
         self._fields, self._written_empty = FieldViews(), False
         if scene.jaws:
             warm_up()
@@ -164,17 +175,68 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             self._exchange_impulses()
 
     def idle_ticks(self, tick: int) -> int:
-        """The ticks until a driven jaw that may grasp something searches; none while jaws or actuators hold."""
-        if self._actuator_grasps or any(self._jaw_grasps) or any(self._thread_grasps):
+        """The ticks until a jaw that may grasp something searches.
+
+        None counts that compiled code finds in vain, with `look_table`; nor do jaws that hold bodies, as long as
+        it holds on to them with the tables of `carried`. That is not so where actuators hold something, jaws a thread,
+        or two of them one body.
+        """
+        if self._actuator_grasps or any(self._thread_grasps) or not self._hold_alone():
             return 0
-        left = ALWAYS
+        left, due = ALWAYS, self._look().due
         for index in self._searching:
+            due[index] = -1
+            if self._jaw_grasps[index] is not None:
+                continue
             if self._near[index]:
                 return 0
             wait = -(tick + index) % SEARCH_PERIOD
             if wait < left and self._fingers[index].driven():
-                left = wait
+                if self._looking[index]:
+                    due[index] = wait
+                else:
+                    left = wait
         return left
+
+    def _look(self) -> Looks:
+        """The boxes in Bullet of what jaws may grasp: others once an engine is rebuilt."""
+        motions = self._world.engine.motions
+        if motions is not self._looked_at:
+            self._looked_at = motions
+            owners = [self._world.engine.body_at.get(place, -1) for place in self._world.engine.boxed]
+            found = self._looks = looks(len(self), len(owners))
+            for index, (fingers, own) in enumerate(zip(self._fingers, self._own, strict=True)):
+                found.fingers[index] = [body in fingers.jaw.fingers for body in owners]
+                found.others[index] = [
+                    body >= 0 and body not in own and not self._scene.bodies[body].static for body in owners
+                ]
+            self._looking = [set(fingers.jaw.fingers) <= set(owners) for fingers in self._fingers]
+            self.look_table = table_of(found) if self._searching else np.zeros(0, np.int64)
+        return self._looks
+
+    def _hold_alone(self) -> bool:
+        """Whether nothing else holds what a jaw holds."""
+        bodies = [held.body for held in self._jaw_grasps if held is not None]
+        return not bodies or (len(set(bodies)) == len(bodies) and set(bodies).isdisjoint(self._actuated()))
+
+    def carried(self) -> tuple[Integers, Integers]:
+        """Tables for compiled code: a `Hold` for each jaw that holds a body, and what is `Exchanged` for each body.
+
+        They are those of the coming ticks, after which `pass_idle` is to follow.
+        """
+        holding = [(index, held) for index, held in enumerate(self._jaw_grasps) if held is not None]
+        if not holding:
+            return NOTHING, NOTHING
+        exchanges = [self._impulses.of([held]) for _, held in holding]
+        for exchange in exchanges:
+            exchange.prepare()
+        return np.array([self._hold_table(*jaw) for jaw in holding]), np.array([found.table for found in exchanges])
+
+    def pass_idle(self, ticks: int) -> None:
+        """Take over what compiled code did with the tables of `carried`."""
+        for held in self._jaw_grasps:
+            if held is not None:
+                self._impulses.of([held]).conclude()
 
     def _search(self, index: int) -> None:
         """Close gently on the nearest body between the fingers; grasp it when both pads touch it."""
@@ -274,25 +336,36 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
 
     def _keep(self, index: int, held: JawGrasp) -> None:
         """Set the commanded normal force; release the body when the jaw opens or the body slipped out."""
-        fingers, motions, arrays = self._fingers[index], self._world.engine.motions, held.grasp.arrays
+        motions = self._world.engine.motions
         motions.prepare()
         found = keep(
-            motions.handle, motions.table, self._world.engine.place_table, self._world.joints.table, held.palm,
-            fingers.axes, fingers.opening, held.levers, held.positions, held.palm_at, arrays.pads[0], arrays.slid[0],
-            held.checked,
+            motions.handle, motions.table, self._world.engine.place_table, self._world.joints.table,
+            self._hold_table(index, held),
         )  # fmt: skip
         if found & RELEASED:
             self._release(index)
             return
         if found & AFRESH:
-            fingers.sort_motors()
+            self._fingers[index].sort_motors()
         if found & CREPT:
             self._follow_slip(index, held)
+
+    def _hold_table(self, index: int, held: JawGrasp) -> Integers:
+        """The table of a `Hold`, for compiled code."""
+        known = self._holds[index]
+        if known is None or known[0] is not held:
+            fingers, arrays = self._fingers[index], held.grasp.arrays
+            hold = Hold(
+                np.array([held.palm]), fingers.axes, fingers.opening, held.levers, held.positions, held.palm_at,
+                held.checked, arrays.pads[0], arrays.slid[0],
+            )  # fmt: skip
+            known = self._holds[index] = held, hold, table_of(hold)
+        return known[2]
 
     def _follow_slip(self, index: int, held: JawGrasp) -> None:
         """Move patch and fingers along with a body that slips; release it when it has slipped out."""
         fingers = self._fingers[index]
-        held.checked = float(held.grasp.slipped[0])
+        held.checked[0] = held.grasp.slipped[0]
         faces = fingers.facing(held.body, fingers.jaw.reach)
         room = np.inf if faces is None else faces[0].gap + faces[1].gap
         if faces is None or room > PRESENT:

@@ -81,6 +81,8 @@ class Engine:
         Where each body outside rods is; the same as arrays, and their addresses for compiled code.
     body_at
         The body at Bullet's multibody and link.
+    boxed
+        Multibody and link of each of the boxes of `Motions.trees`.
     chunks
         For bodies whose shapes are in other multibodies than their own: these, with link, group and mask.
     gravity
@@ -168,6 +170,7 @@ class Engine:
         tree_of = {uid: k for k, tree in enumerate(self.trees) for uid in tree.bases}
         live = [i for i, (*_, group, mask) in enumerate(self._colliders) if (group, mask) != VOID] if len(at) else []
         found = boxes(len(self.trees), len(live), len(at))
+        self.boxed = [self._colliders[i][:2] for i in live]
         found.phase[0] = self._boxes
         found.at[:], found.owner[:] = at[live], owner[live]
         found.tree[:] = [tree_of[self._colliders[i][0]] for i in live]

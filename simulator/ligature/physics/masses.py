@@ -42,7 +42,13 @@ IMMOVABLE = 1e6
 
 
 class Masses:
-    """The masses of an engine's bodies, by who holds and commands them."""
+    """The masses of an engine's bodies, by who holds and commands them.
+
+    Attributes
+    ----------
+    laden, lifts
+        (n,) bodies with added mass, and the forces (n, 3) that cancel its weight.
+    """
 
     def __init__(self, engine: Engine, commands: BodyCommands, welds: Welds) -> None:
         self._engine, self._commands, self._welds = engine, commands, welds
@@ -97,26 +103,21 @@ class Masses:
         """Whether a body has added mass."""
         return body in self._attached_loads
 
-    @property
-    def added(self) -> bool:
-        """Whether any body has added mass."""
-        return bool(self._attached_loads)
-
     def lift(self) -> None:
         """Cancel the weight of added mass in the coming tick."""
         engine = self._engine
         if not self._attached_loads:
             return
         if engine.motions.handle:
-            push_bodies(engine.motions.handle, engine.motions.table, engine.place_table, self._laden, self._lifts)
+            push_bodies(engine.motions.handle, engine.motions.table, engine.place_table, self.laden, self.lifts)
             return
         for place, force in self._attached_loads.values():
             place.apply_force(force)
 
     def _list_loads(self) -> None:
         """List bodies with added mass, and the forces (n, 3) that cancel its weight, for compiled code."""
-        self._laden = np.array(list(self._attached_loads), dtype=np.int64)
-        self._lifts = np.array([force for _, force in self._attached_loads.values()]).reshape(-1, 3)
+        self.laden = np.array(list(self._attached_loads), dtype=np.int64)
+        self.lifts = np.array([force for _, force in self._attached_loads.values()]).reshape(-1, 3)
 
     def update_commanded(self, body: int, before: bool) -> None:
         """Update the mass of a light free body that was driven ``before`` a command began or ended."""

@@ -282,10 +282,7 @@ class World(Subsystem):
     @property
     def coasts(self) -> bool:
         """Whether `step`, too, does nothing but advance Bullet, as long as no command comes."""
-        return not (
-            self.masses.added or self.collisions.waits or self._parting.watches or self.chunks.bodies
-            or self.scene.closures
-        )  # fmt: skip
+        return not (self.collisions.waits or self._parting.watches or self.chunks.bodies or self.scene.closures)
 
     def conclude(self, sound: bool) -> None:
         """Put back what diverged in ticks of compiled code, unless all is ``sound``."""

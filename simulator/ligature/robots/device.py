@@ -6,7 +6,6 @@ Seconds of simulated time. A command that is not carried out raises `Rejected` a
 from __future__ import annotations
 
 import math
-import operator
 from collections import deque
 from dataclasses import dataclass
 from typing import Any
@@ -280,8 +279,10 @@ class Device:
 
     def pass_idle(self, ticks: int, dt: float) -> None:
         """Count the time of ``ticks`` in which the device is idle, with the bits of as many calls of `tick`."""
+        time = self.time
         for _ in range(ticks):
-            self.time += dt
+            time += dt
+        self.time = time
 
     def _advance(self, dt: float) -> None:
         for axes in self._groups():
@@ -323,12 +324,14 @@ class Device:
         return bool(self._astray) or self._follows()
 
     @property
-    def is_on_course(self) -> bool:
-        """Whether `watch` would do nothing now."""
-        if self._astray:
-            return False
-        followed = self._followed()
-        return followed is None or all(map(operator.le, followed[1], self._following_bounds))
+    def is_astray(self) -> bool:
+        """Whether a following error was beyond its bound at the last check."""
+        return bool(self._astray)
+
+    @property
+    def following_bounds(self) -> list[float]:
+        """Following errors (n,) beyond which the device stops with a fault, when they last."""
+        return self._following_bounds
 
     def _follows(self) -> bool:
         """Whether joints have a set-point to follow."""

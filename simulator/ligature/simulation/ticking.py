@@ -46,7 +46,7 @@ class Ticking:
     def __init__(self, parts: Parts, subsystems: Subsystems, clock: Clock) -> None:
         self._world, self._subsystems, self._clock = parts.world, subsystems, clock
         self.phases = {name: Stopwatch() for name in PHASES}
-        self.coasting = Coasting(parts.world, parts.suture)
+        self.coasting = Coasting(parts.world, parts.suture, parts.grasps, parts.arms)
         stepping = [
             (self.phases[phase], [s for s in subsystems if type(s).step is not Subsystem.step])
             for phase, subsystems in parts.phases.items()
@@ -65,7 +65,7 @@ class Ticking:
         self._after_bodies = _never_idle_first(_parted([s for _, group in self._unsolved for s in group], World)[0])
 
     def advance(self, ticks: int) -> int:
-        """Advance by a tick, or by up to ``ticks`` in which only bodies and threads have work; returns how many.
+        """Advance by a tick, or by up to ``ticks`` in which only bodies, threads and jaws have work; returns how many.
 
         In a tick commands become motor targets and forces, threads and grasps exchange impulses, bodies move.
         """
