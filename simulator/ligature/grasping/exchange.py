@@ -31,7 +31,7 @@ RELEASED, AFRESH, CREPT = 1, 2, 4
 """What `keep` finds: the jaw lets go; a finger was not stopped before; the body has slipped by `CREEP`."""
 
 
-class Hold(NamedTuple):
+class JawArrays(NamedTuple):
     """A jaw that holds a body."""
 
     palm: Integers  # (1,) the body of the pads
@@ -58,12 +58,12 @@ class Exchanged(NamedTuple):
 
 
 _whole, _real = np.zeros(1, np.int64), np.zeros(1)
-open_hold = opener(Hold(_whole, _whole, *[_real] * 7))
+open_jaw = opener(JawArrays(_whole, _whole, *[_real] * 7))
 open_exchanged = opener(Exchanged(_whole, _whole, _whole, _real, _real, _real, np.zeros(1, np.bool_)))
 
 
 @inlined
-def _press(axes: Axes, trees: Trees, held: Hold) -> float:
+def _press(axes: Axes, trees: Trees, held: JawArrays) -> float:
     """Force between the fingers of a jaw, by the efforts that their commands ask for."""
     force = np.inf
     for side in range(2):
@@ -83,10 +83,10 @@ def _jumped(trees: Trees, row: int, palm_at: Array) -> bool:
 
 @kernel
 def keeps(handle: int, tree_table: Integers, place_table: Integers, axis_table: Integers, holds: Integers) -> bool:
-    """Whether `keep` would find nothing for any of the jaws of ``holds`` (j, words), tables of a `Hold`."""
+    """Whether `keep` would find nothing for any of the jaws of ``holds`` (j, words), tables of a `JawArrays`."""
     trees, places, axes = open_trees(tree_table), open_places(place_table), open_axes(axis_table)
     for j in range(holds.shape[0]):
-        held = open_hold(holds[j])
+        held = open_jaw(holds[j])
         palm = held.palm[0]
         bring_up(handle, trees, places.tree[palm], places.link[palm] >= 0)
         released = not _press(axes, trees, held) > 0.0 or _jumped(trees, places.row[palm], held.palm_at)
@@ -100,10 +100,10 @@ def keeps(handle: int, tree_table: Integers, place_table: Integers, axis_table: 
 def keep(handle: int, tree_table: Integers, place_table: Integers, axis_table: Integers, hold_table: Integers) -> int:
     """Press the pads of a jaw by the efforts that the commands of its fingers ask for.
 
-    ``hold_table`` is that of a `Hold`. Returns the sum of what it finds; a jaw that lets go is left as it is.
+    ``hold_table`` is that of a `JawArrays`. Returns the sum of what it finds; a jaw that lets go is left as it is.
     """
     trees, places, axes = open_trees(tree_table), open_places(place_table), open_axes(axis_table)
-    held = open_hold(hold_table)
+    held = open_jaw(hold_table)
     palm, force = held.palm[0], _press(axes, trees, held)
     row = places.row[palm]
     bring_up(handle, trees, places.tree[palm], places.link[palm] >= 0)
@@ -176,7 +176,7 @@ def carry(
 ) -> bool:  # fmt: skip
     """Do what jaws do in a tick in which each holds on to its body; False, and nothing, where one may not.
 
-    The tables are those of a `Hold` for each jaw, and of what is `Exchanged` for each body.
+    The tables are those of a `JawArrays` for each jaw, and of what is `Exchanged` for each body.
     """
     if holds.shape[0] == 0:
         return True
@@ -195,7 +195,9 @@ def warm_up() -> None:
     moves, held, room = motions(1), grasp_arrays(1), scratch(1)
     here, place = table_of(group), table_of(places)
     zero, one = np.zeros(3), np.ones(3)
-    hold = Hold(np.zeros(1, np.int64), np.zeros(2, np.int64), one[:2], one[:2], one[:2], one, zero[:1], zero, zero[:2])
+    hold = JawArrays(
+        np.zeros(1, np.int64), np.zeros(2, np.int64), one[:2], one[:2], one[:2], one, zero[:1], zero, zero[:2]
+    )
     keep(0, here, place, table_of(laws), table_of(hold))
     moves, held, room = motions(1), grasp_arrays(1), scratch(1)
     tables = table_of(moves), table_of(held), table_of(room)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ligature.grasping import thread_grasps
 from ligature.grasping.actuator_grasps import ActuatorGrasps
-from ligature.grasping.exchange import AFRESH, CREPT, RELEASED, Hold, keep, warm_up
+from ligature.grasping.exchange import AFRESH, CREPT, RELEASED, JawArrays, keep, warm_up
 from ligature.grasping.fingers import TOUCH, Facing, Fingers
 from ligature.grasping.grasp import Patch
 from ligature.grasping.impulses import BodyGrasp, ImpulseExchange, begin
@@ -106,7 +106,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._disabled: list[list[int]] = [[] for _ in scene.jaws]
         self._near = [False for _ in scene.jaws]
         self._impulses = ImpulseExchange(world)
-        self._holds: list[tuple[JawGrasp, Hold, Integers] | None] = [None for _ in scene.jaws]
+        self._holds: list[tuple[JawGrasp, JawArrays, Integers] | None] = [None for _ in scene.jaws]
         """Tables of the jaw grasps, for compiled code."""
         self._looked_at: object = None
         self.look_table: Integers = np.zeros(0, np.int64)
@@ -220,7 +220,7 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         return not bodies or (len(set(bodies)) == len(bodies) and set(bodies).isdisjoint(self._actuated()))
 
     def carried(self) -> tuple[Integers, Integers]:
-        """Tables for compiled code: a `Hold` for each jaw that holds a body, and what is `Exchanged` for each body.
+        """Tables for compiled code: `JawArrays` of each jaw that holds a body, and what is `Exchanged` for each body.
 
         They are those of the coming ticks, after which `pass_idle` is to follow.
         """
@@ -351,11 +351,11 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
             self._follow_slip(index, held)
 
     def _hold_table(self, index: int, held: JawGrasp) -> Integers:
-        """The table of a `Hold`, for compiled code."""
+        """The table of a `JawArrays`, for compiled code."""
         known = self._holds[index]
         if known is None or known[0] is not held:
             fingers, arrays = self._fingers[index], held.grasp.arrays
-            hold = Hold(
+            hold = JawArrays(
                 np.array([held.palm]), fingers.axes, fingers.opening, held.levers, held.positions, held.palm_at,
                 held.checked, arrays.pads[0], arrays.slid[0],
             )  # fmt: skip
