@@ -162,7 +162,7 @@ def _demonstrated(task: str, seed: int, noise: float, coasts: bool) -> tuple[lis
     """State hashes of an episode, and ticks that coasted while a jaw held something."""
     env = SuturingEnv(task, max_steps=180)
     simulation, hashes, carried = env.simulation, list[str](), 0
-    coast = simulation._coasting.pass_ticks
+    coast = simulation._ticking.coasting.pass_ticks
 
     def counted(ticks: int, begins: bool = False) -> tuple[int, int]:
         nonlocal carried
@@ -174,7 +174,7 @@ def _demonstrated(task: str, seed: int, noise: float, coasts: bool) -> tuple[lis
         hashes.append(simulation.state_hash())
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulation._coasting, "pass_ticks", counted)
+        patch.setattr(simulation._ticking.coasting, "pass_ticks", counted)
         demonstrate(env, seed, noise, look, slips=True)
         for _ in range(8):  # the jaws open
             env.step(np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0], dtype=np.float32))

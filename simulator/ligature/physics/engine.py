@@ -241,6 +241,7 @@ class Engine:
 
     def close(self) -> None:
         """Give the Bullet client back; an engine that is forgotten does so by itself."""
+        self.motions.handle = 0  # compiled code would read what is no longer there
         self._end()
 
 

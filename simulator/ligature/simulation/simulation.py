@@ -244,9 +244,19 @@ class Simulation:
             self.arms.release(command.index)
 
     def set_pose(self, body: int, pose: Array) -> None:
-        """Move the root body of a tree to ``pose`` (7,), at rest, together with a thread that is attached to it alone.
+        """Move the root ``body`` of a tree to ``pose``, at rest, together with a thread that is attached to it alone.
 
-        Raises ValueError for a body that a joint holds, such as a link of an arm, and for an element of a thread.
+        Parameters
+        ----------
+        body
+            Index of the body in the scene.
+        pose
+            (7,) position (m) and quaternion x, y, z, w in the world.
+
+        Raises
+        ------
+        ValueError
+            For a body that a joint holds, such as a link of an arm, and for an element of a thread.
         """
         self._check_open()
         BodyCommand(body, CommandType.POSITION, tuple(pose)).check(self._counts)
