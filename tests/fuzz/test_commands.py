@@ -65,6 +65,8 @@ def test_what_an_arm_raises_becomes_its_fault_and_the_others_go_on(
     for part in ("_advance", "watch", "hold", "settle"):
         with monkeypatch.context() as patch:
             patch.setattr(first, part, broken)
+            if part == "watch":  # compiled ticks ask for it where an arm has strayed alone
+                patch.setattr(simulation._ticking.coasting, "pass_ticks", lambda *_: (0, 0))
             simulation.arms.events()
             simulation.step(10)
             simulation.apply(Release("arm", 0))
