@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from itertools import cycle
 from types import SimpleNamespace
 from typing import Any
 from xmlrpc.client import ServerProxy
@@ -25,9 +26,13 @@ LARGE = 300_000
 """Bytes of a message that does not fit the buffers of `client`, as the surface of a tissue for a distant viewer."""
 
 
+TIMEOUTS = cycle((60.0, None))
+
+
 def client() -> tuple[SimpleNamespace, socket.socket]:
-    """rospy's side of a connection, and the client's socket."""
+    """rospy's side of a connection, with a timeout as rospy has it or none, and the client's socket."""
     ours, theirs = socket.socketpair()
+    ours.settimeout(next(TIMEOUTS))
     ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 16384)
     connection = SimpleNamespace(socket=ours, done=False, closed=False, stat_bytes=0, stat_num_msg=0)
 

@@ -8,6 +8,7 @@ misses messages instead. Of a message that its socket takes only in part, the re
 from __future__ import annotations
 
 import io
+import os
 import select
 import socket
 import time
@@ -119,7 +120,7 @@ def _send(connection: Connection, data: Data) -> Data:
     if connection.done or client is None:
         return NOTHING
     try:
-        sent = client.send(data, socket.MSG_DONTWAIT)
+        sent = _send_at_once(client, data)
     except BlockingIOError:
         return data
     except OSError:
@@ -130,6 +131,17 @@ def _send(connection: Connection, data: Data) -> Data:
         return memoryview(data)[sent:]
     connection.stat_num_msg += 1
     return NOTHING
+
+
+def _send_at_once(client: Any, data: Data) -> int:
+    """Send what a socket has room for; returns how much that was, and raises BlockingIOError for nothing.
+
+    rospy gives all sockets of a process a timeout of a minute. Python's `send` then waits, whatever its flags are, for
+    a descriptor that does not block.
+    """
+    if client.gettimeout() is None:
+        return int(client.send(data, socket.MSG_DONTWAIT))
+    return os.write(client.fileno(), data)
 
 
 def _send_within(connection: Connection, data: Data, seconds: float) -> Data:
