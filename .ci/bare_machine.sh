@@ -2,10 +2,16 @@
 # Smoke of a stranger's machine: sets up and runs HEAD in a bare Debian 12 (make, certificates, nothing recommended).
 #
 # `make run` up to the first state, ended with Ctrl-C, then `ligature check` and `ligature bench`, the latter also as a
-# user who can write nowhere. What it needs, and BARE_SYSTEM: bare_room.sh.
+# user who can write nowhere. What it needs, and BARE_SYSTEM: bare_room.sh. BARE_KERNELS=DIR puts kernels that this
+# machine has compiled into the room, where only that user's then compile; without it all do, in some minutes.
 set -euo pipefail
 try="bare machine"
-furnish() { git -C "$project" -c safe.directory="$project" archive HEAD | tar -x -C "$1/home/project"; }
+furnish() {
+    git -C "$project" -c safe.directory="$project" archive HEAD | tar -x -C "$1/home/project"
+    [ -d "${BARE_KERNELS:-}" ] || return 0
+    mkdir -p "$1/root/.cache/ligature"
+    cp -a "$BARE_KERNELS" "$1/root/.cache/ligature/kernels"
+}
 . "$(dirname "$0")/bare_room.sh"
 
 run_to_first_state 1500 inside make run || true # the status of make shows Ctrl-C
