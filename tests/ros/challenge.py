@@ -207,5 +207,5 @@ def stitch_path(entry: np.ndarray, exit_: np.ndarray) -> list[np.ndarray]:
     centre = at(*(entry[:3, 3] + exit_[:3, 3]) / 2) @ at(0, 0, math.sqrt(radius**2 - half**2))
     first, last = math.radians(150), math.radians(20)
     return [
-        centre @ turned(0, -math.pi / 2) @ turned(2, where - own) for where in np.linspace(first, last, 20).tolist()
+        centre @ turned(0, -math.pi / 2) @ turned(2, where - own) for where in np.linspace(first, last, 30).tolist()
     ]

@@ -232,7 +232,7 @@ def test_a_needle_driven_through_entry_and_exit_is_two_insertions_in_order(
     insertions = Insertions(needle, holes)
     for pose in path:
         # slowly: a needle that lags behind cuts the corner
-        for _ in range(5):
+        for _ in range(6):
             needle.set_pose(message(pose))  # again and again: who falls silent lets it go
             stage.sleep(0.05)
             insertions.sample()
