@@ -8,9 +8,8 @@ import sys
 
 import pytest
 
-LOST = """
+LOSING = """
 import os, signal, sys, weakref
-from ligature.datasets.interrupts import interrupted_once
 
 class Held:
     pass
@@ -18,6 +17,9 @@ class Held:
 def lose(_):
     os.kill(os.getpid(), signal.{name})
     sum(range(1000))
+"""
+LOST = """
+from ligature.datasets.interrupts import interrupted_once
 
 ended = []
 try:
@@ -42,23 +44,15 @@ except KeyboardInterrupt as interrupt:
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_an_interrupt_that_is_lost_comes_again_and_never_into_the_clean_up(name: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", LOST.replace("{name}", name)], capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", (LOSING + LOST).replace("{name}", name)], capture_output=True, text=True, timeout=60
     )
     assert done.stdout == f"cleaned up {int(getattr(signal, name))}\n", done.stderr
     assert done.returncode == 0
 
 
 WRITING = """
-import os, signal, weakref
 from ligature.datasets import interrupts
 from ligature.process import signals_held
-
-class Held:
-    pass
-
-def lose(_):
-    os.kill(os.getpid(), signal.{name})
-    sum(range(1000))
 
 interrupts._LATER = 30.0  # its alarm is sent below
 held = Held()
@@ -82,7 +76,7 @@ except KeyboardInterrupt as interrupt:
 @pytest.mark.parametrize("before", [True, False], ids=["lost before", "while writing"])
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_an_interrupt_waits_for_what_is_being_written(name: str, before: bool) -> None:
-    code = WRITING.replace("{name}", name).replace("{before}", str(before))
+    code = (LOSING + WRITING).replace("{name}", name).replace("{before}", str(before))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.stdout == f"whole\n{int(getattr(signal, name))}\n", done.stderr
     assert done.returncode == 0

@@ -10,7 +10,6 @@ from ligature.coasting.clock import now
 from ligature.coasting.passages import find_passages
 from ligature.grasping.exchange import carry
 from ligature.grasping.looking import may_grasp
-from ligature.grasping.looking_at_threads import may_grasp_threads
 from ligature.kernels import inlined, kernel
 from ligature.physics.preparing import prepare
 from ligature.physics.trees import load_body, push_bodies, read_bodies, step_world
@@ -65,11 +64,10 @@ def coast(
                 return passed, LOOKED, True
             whole = _pass_rods(handle, tree_table, place_table, threads, total, acted, dt)
         held = passed < ticks
-        if held:
-            if threads is not None:
-                held = not may_grasp_threads(tree_table, looks, threads[3], passed)
-            else:
-                held = not may_grasp(tree_table, looks, passed)
+        if threads is not None:
+            held = held and not may_grasp(tree_table, looks, threads[3], passed)
+        else:
+            held = held and not may_grasp(tree_table, looks, None, passed)
         held = held and carry(handle, tree_table, place_table, axis_table, total, acted, holds, exchanges, dt)
         moved = now(clock)
         spent[1] += moved - prepared

@@ -192,7 +192,6 @@ def carry(
 def warm_up() -> None:
     """Compile the kernels or load them from the cache, so that the first grasp of a run does not wait."""
     group, places, laws = trees(1, 1, 2), Places(*np.array([[0], [0], [0], [-1]])), axes(1, 2)  # tables need them alive
-    moves, held, room = motions(1), grasp_arrays(1), scratch(1)
     here, place = table_of(group), table_of(places)
     zero, one = np.zeros(3), np.ones(3)
     hold = JawArrays(

@@ -15,6 +15,7 @@ from ligature.kernels import inlined
 from ligature.physics.bullet import real_at
 from ligature.physics.parking import HIGH, LOW, ROUNDING, Boxes
 from ligature.physics.trees import open_trees
+from ligature.suture.ticking import open_rod_tick
 from ligature.tables import opener
 
 Array = NDArray[np.float64]
@@ -77,8 +78,11 @@ def meets_body(boxes: Boxes, looks: Looks, j: int) -> bool:
 
 
 @inlined
-def may_grasp(tree_table: Integers, table: Integers, passed: int) -> bool:
-    """Whether a jaw searches after ``passed`` ticks, and may find a body; ``table`` is that of `Looks`, or empty."""
+def may_grasp(tree_table: Integers, table: Integers, rods: Integers | None, passed: int) -> bool:
+    """Whether a jaw searches after ``passed`` ticks, and may find a body or a part of the ``rods`` (r, w).
+
+    ``table`` is that of `Looks`, or empty. Without ``rods`` nothing of them is compiled.
+    """
     if table.shape[0] == 0:
         return False
     boxes, looks = open_trees(tree_table).boxes, open_looks(table)
@@ -86,5 +90,22 @@ def may_grasp(tree_table: Integers, table: Integers, passed: int) -> bool:
         if searches(looks.due[j], passed):
             surround_fingers(boxes, looks, j)
             if meets_body(boxes, looks, j):
+                return True
+            if rods is not None:  # noqa: SIM102 - Numba leaves out a branch by None alone
+                if _has_element(rods, looks.box):
+                    return True
+    return False
+
+
+@inlined
+def _has_element(rods: Integers, box: Array) -> bool:
+    """Whether the centre of an element is in a box (2, 3)."""
+    for r in range(rods.shape[0]):
+        positions = open_rod_tick(rods[r]).positions
+        for i in range(positions.shape[0]):
+            inside = True
+            for a in range(3):
+                inside = inside and box[0, a] <= positions[i, a] <= box[1, a]
+            if inside:
                 return True
     return False

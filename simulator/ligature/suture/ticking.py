@@ -1,7 +1,7 @@
 """Ticks of rods for compiled code that does other parts of a tick, too: what one takes is one table for each rod.
 
 Other kernels call `tick_rod` by its address. Numba would make its code, two thirds of all, part of each of them, which
-took half a minute of compilation and 10 MB of each process.
+took half a minute of compilation and 8 MB of each process.
 """
 
 from __future__ import annotations
