@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 _GROUP_TRIES, _GROUP_PAUSE = 4, 0.11
@@ -106,6 +106,33 @@ def run_in_real_time() -> bool:
     except OSError:
         return False
     return True
+
+
+@contextmanager
+def scheduled_as_before() -> Iterator[None]:
+    """After the block, Linux schedules all threads as it did before, and new ones as it does most.
+
+    For libraries that meddle with it: SVT-AV1 gives root's threads, the caller's too, the highest real-time priority.
+    """
+    before = _schedules()
+    try:
+        yield
+    finally:
+        ordinary = os.SCHED_OTHER, os.sched_param(0)
+        for thread, (policy, param) in _schedules().items():
+            was = before.get(thread, ordinary)
+            if (policy, param.sched_priority) != (was[0], was[1].sched_priority):
+                with suppress(OSError):  # it has ended
+                    os.sched_setscheduler(thread, *was)
+
+
+def _schedules() -> dict[int, tuple[int, os.sched_param]]:
+    """Scheduling policy and parameters of each thread of this process by its number."""
+    found = {}
+    for thread in map(int, os.listdir("/proc/self/task")):
+        with suppress(OSError):  # it has ended
+            found[thread] = os.sched_getscheduler(thread), os.sched_getparam(thread)
+    return found
 
 
 def report(event: str, text: str = "") -> None:

@@ -12,6 +12,8 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.process import scheduled_as_before
+
 PIXELS = "yuv420p"
 """Halves the resolution of colour: width and height must be even."""
 
@@ -42,6 +44,8 @@ def encode(path: Path, pictures: Iterable[NDArray[np.uint8]], size: tuple[int, i
         stream: Any = container.add_stream(codec.encoder, rate=fps, options=codec.options)
         stream.width, stream.height, stream.pix_fmt = *size, PIXELS
         stream.time_base = stream.codec_context.time_base = Fraction(1, fps)
+        with scheduled_as_before():
+            stream.codec_context.open()
         for picture in pictures:
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
             frame.pts, frame.time_base = count, Fraction(1, fps)
