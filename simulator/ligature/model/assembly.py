@@ -337,6 +337,7 @@ class _Assembly:
         for place in places:
             for k, gram in enumerate(mechanism.freedoms(place, REDUNDANT)):
                 grams[k] += gram
+        gaps = np.max([mechanism.gaps(place).max(axis=1) for place in places], axis=0)
         found, slack = [], []
         stuck = len(places) == 1 and mechanism.tangent(places[0], REDUNDANT).shape[1] > 0
         for k, chain in enumerate(mechanism.chains):
@@ -351,7 +352,7 @@ class _Assembly:
                     for i in range(3)
                     if np.sqrt(max(scale[i], 0.0)) < REDUNDANT
                 ]
-            open_by = max(float(mechanism.gaps(place)[k].max()) for place in places)
+            open_by = float(gaps[k])
             found.append(tuple(free) if open_by > CONSISTENT else ())
             slack.append(open_by if free else 0.0)
         return found, slack
