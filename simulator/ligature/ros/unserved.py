@@ -93,7 +93,7 @@ class Use(NamedTuple):
 
 
 class Unserved:
-    """Finds such topics in what a master knows; reports each once.
+    """Finds such topics in what a master knows; reports each once, and again for a node that left and came back.
 
     ``root`` is the beginning of the names of this run, ``/`` or ``/left/``, and ``arms`` the names of its arms.
     """
@@ -122,7 +122,8 @@ class Unserved:
         found = {use for use in _uses(*ends) if self._concerns(use.topic)}
         self._looks = Counter({use: self._looks[use] + 1 for use in found})
         new = sorted(use for use in found - self._reported if self._looks[use] >= _looks_needed(use.topic))
-        self._reported |= set(new)
+        here = {node for side in ends for nodes in side.values() for node in nodes}
+        self._reported = {use for use in self._reported if use.node in here} | set(new)
         served = [{topic for topic, nodes in side.items() if any(map(_is_ours, nodes))} for side in ends]
         lines = []
         for node in dict.fromkeys(use.node for use in new):
