@@ -2,18 +2,26 @@
 # The tests that watch real time: sh .ci/real_time_tests.sh PYTHON TESTS…
 # They share the machine with whatever else runs on it, so that up to forty that fail run once more, in a process of
 # their own, when the process LIGATURE_RETRY_AFTER has ended. Both runs are shown, and the last lines name what passed the
-# second time only; LIGATURE_RETRY=0 does without.
+# second time only; LIGATURE_RETRY=0 does without. LIGATURE_BETWEEN is a command that would disturb them: it runs after the
+# first run, beside what else runs on the machine, and its failure counts.
 python=$1
 shift
 memory="-o addopts=-ra -o cache_dir=build/real_time_tests"
+between=0
+leave() { # STATUS
+    [ "$1" -ne 0 ] || exit "$between"
+    exit "$1"
+}
 rm -rf build/real_time_tests
 "$python" -m pytest -m "not slow" $memory "$@"
 status=$?
-[ $status -eq 1 ] && [ "${LIGATURE_RETRY:-1}" != 0 ] || exit $status
+[ -z "${LIGATURE_BETWEEN:-}" ] || sh -c "$LIGATURE_BETWEEN" || between=$?
+[ $status -eq 1 ] && [ "${LIGATURE_RETRY:-1}" != 0 ] || leave $status
 failed=$("$python" -m pytest -m "not slow" $memory --last-failed --collect-only -q "$@" | grep '::')
 count=$(printf '%s\n' "$failed" | grep -c '::')
-[ "$count" -ge 1 ] && [ "$count" -le 40 ] || exit $status
+[ "$count" -ge 1 ] && [ "$count" -le 40 ] || leave $status
 [ -z "${LIGATURE_RETRY_AFTER:-}" ] || tail -f /dev/null --pid="$LIGATURE_RETRY_AFTER"
 echo "running what failed once more: $count of the tests that watch real time"
-"$python" -m pytest -m "not slow" $memory --last-failed "$@" || exit
+"$python" -m pytest -m "not slow" $memory --last-failed "$@" || leave $?
 printf 'passed the second time only:\n%s\n' "$failed"
+leave 0

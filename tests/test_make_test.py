@@ -49,6 +49,20 @@ def test_few_that_fail_run_once_more(tmp_path: Path, late: int, broken: int, ret
     assert named == ([] if status or not late else ["".join(f"test_some.py::test_late[{k}]\n" for k in range(late))])
 
 
+@pytest.mark.parametrize(("late", "wanted", "status"), [(0, 0, 0), (0, 3, 3), (1, 0, 0), (1, 3, 3), (41, 3, 1)])
+def test_what_runs_between_counts(tmp_path: Path, late: int, wanted: int, status: int) -> None:
+    (tmp_path / "test_some.py").write_text(TESTS.format(late=late, broken=0))
+    (tmp_path / "pyproject.toml").write_text("[tool.pytest.ini_options]\naddopts = '-p no:cacheprovider'\n")
+    run = subprocess.run(
+        ["sh", ROOT / ".ci" / "real_time_tests.sh", sys.executable, "."],
+        cwd=tmp_path, env={"PATH": "/usr/bin:/bin", "LIGATURE_BETWEEN": f"echo now between; exit {wanted}"},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert run.returncode == status, run.stdout + run.stderr
+    before, after = run.stdout.split("now between\n")
+    assert ("failed" in before) == (late > 0) and ("1 passed" in after) == (late == 1)
+
+
 HALF = """
 import os, signal, time
 def test_meets_the_other_half():
