@@ -3,7 +3,8 @@
 #
 # The tests that watch real time mostly wait. What they leave of the processors goes to all others: two workers of lower
 # priority, whose output comes when the tests that watch real time are done. What these fail for once, they may try again
-# when nothing runs beside them.
+# when nothing runs beside them. Where Linux shares the processor among sessions first, those of the simulators under test
+# would count no more than the session of the two workers: that is a session of its own, of lower priority as a whole.
 set -u
 python=$1
 shift
@@ -13,8 +14,9 @@ mkdir -p build/logs
 log=build/logs/unit_tests.log
 : >"$log"
 # a shell starts what is in the background deaf to Ctrl-C, which tests of Ctrl-C would inherit
-# shellcheck disable=SC2086
-nice -n 19 env --default-signal=INT,QUIT \
+# shellcheck disable=SC2086,SC2016
+setsid sh -c 'echo 5 2>/dev/null >/proc/self/autogroup; exec "$@"' sh \
+    nice -n 19 env --default-signal=INT,QUIT \
     "$python" -m pytest -m "not slow" -n 2 --dist loadfile tests $ignored >"$log" 2>&1 </dev/null &
 others=$!
 trap 'kill "$others" 2>/dev/null' EXIT

@@ -219,6 +219,9 @@ def test_the_evaluation_reads_needle_and_camera_from_their_literal_topics(
     assert abs(stage.client.get_time() - time.time()) < 1.0
 
 
+@pytest.mark.parametrize(
+    "stage", ["ours", pytest.param("lab", marks=(pytest.mark.corpus, pytest.mark.slow))], indirect=True
+)
 def test_a_needle_driven_through_entry_and_exit_is_two_insertions_in_order(
     stage: Stage, needle: Any, holes: dict[str, Any]
 ) -> None:
@@ -269,21 +272,29 @@ def test_reports_and_joint_errors_travel_over_the_clients_node(stage: Stage) -> 
 
 def test_fifty_clock_edges_a_second_are_fifty_updates(stage: Stage) -> None:
     world, rate = stage.world, stage.client.create_rate(50)
-    world.enable_throttling(True)
-    world.set_num_step_skips(1)
-    world.update()
-    step, sim_time = int(steady(world.get_sim_step, 0.3)), stage.sim_time
-    for edge in range(1, 51):
+    for _ in range(8):
+        world.enable_throttling(True)
+        world.set_num_step_skips(1)
+        last = time.monotonic()
         world.update()
-        rate.sleep()
-        behind = 5 if edge < 50 else 0  # a busy machine takes its time; within the simulator's time-out
-        deadline = time.monotonic() + 0.45
-        while world.get_sim_step() < step + edge - behind and time.monotonic() < deadline:
-            time.sleep(0.002)
-    assert world.get_sim_step() - step == 50
-    assert stage.sim_time - sim_time == pytest.approx(50 * 0.005, abs=1e-4)
-    world.enable_throttling(False)
-    world.update()
+        step, sim_time = int(steady(world.get_sim_step, 0.2)), stage.sim_time
+        longest = 0.0
+        for edge in range(1, 51):
+            longest, last = max(longest, time.monotonic() - last), time.monotonic()
+            world.update()
+            rate.sleep()
+            behind = 5 if edge < 50 else 0  # a busy machine takes its time; within the simulator's time-out
+            deadline = time.monotonic() + 0.45
+            while world.get_sim_step() < step + edge - behind and time.monotonic() < deadline:
+                time.sleep(0.002)
+        steps, passed = world.get_sim_step() - step, stage.sim_time - sim_time
+        world.enable_throttling(False)
+        world.update()
+        if longest < 0.4:  # else this machine let the simulation wait for half a second, after which it runs free
+            break
+        stage.sleep(0.1)
+    assert steps == 50
+    assert passed == pytest.approx(50 * 0.005, abs=1e-4)
 
 
 def test_a_point_cloud_script_finds_its_parameter_and_may_rewrite_it(stage: Stage, node: Any) -> None:
