@@ -65,6 +65,21 @@ def test_a_quoted_scalar_is_replaced_with_its_quotes() -> None:
     assert "  name: c\n" in apply(TEXT, [set_value(TEXT, block(TEXT, "BODY b"), "name", "c")])
 
 
+@pytest.mark.parametrize("before", ["", "  ", "~", "null", "1.0", "'x'", "{}", "[1, 2]"])
+@pytest.mark.parametrize("space", ["", " ", "   "])
+@pytest.mark.parametrize("behind", ["", "  # why", "\n"])
+def test_a_scalar_takes_the_place_of_whatever_was_there(before: str, space: str, behind: str) -> None:
+    """A key without a value, or with nothing but a comment, included: there must be a blank between it and a value."""
+    if before and not space:
+        space = " "
+    text = f"B:\n  mass:{space}{before}{behind}\n  name: b\n"
+    node = parse(text, Path("m.yaml")).get("B")
+    assert isinstance(node, Mapping)
+    changed = apply(text, [set_value(text, node, "mass", 2.5)])
+    assert plain(parse(changed, Path("m.yaml"))) == {"B": {"mass": "2.5", "name": "b"}}, changed
+    assert changed.count("# why") == text.count("# why") and changed.count("\n") == text.count("\n")
+
+
 def test_a_value_behind_an_alias_is_changed_for_its_own_user_only() -> None:
     after = apply(TEXT, [set_value(TEXT, block(TEXT, "BODY b"), "inertia.ix", 3)])
     assert [b for _, b in changed(TEXT, after)] == ["  inertia: {ix: 3, iy: 2}"]

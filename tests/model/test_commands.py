@@ -50,3 +50,17 @@ def test_too_large_numbers_are_refused(command: Command, message: str) -> None:
 )
 def test_numbers_up_to_the_bound_pass(command: Command) -> None:
     command.check()
+
+
+def test_no_command_is_for_an_object_that_the_scene_lacks() -> None:
+    commands = (
+        BodyCommand(2, CommandType.FORCE, REST), ActuatorCommand(2, False, "", None), PlaceCommand("camera", 2, None),
+        Release("body", 2),
+    )  # fmt: skip
+    for command in commands:
+        assert command.object is not None
+        kind, _ = command.object
+        command.check({kind: 3})
+        for counts in ({kind: 2}, {kind: 1}, {kind: 0}, {}, {"other": 9}):
+            with pytest.raises(ValueError, match=f"^the scene has no {kind} number 2$"):
+                command.check(counts)
