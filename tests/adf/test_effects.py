@@ -412,7 +412,7 @@ def candidates(kind: str, key: Key) -> Iterator[tuple[Any, Any]]:
     elif key.type in (Type.INTEGER, Type.UNSIGNED):
         yield from ((3, 4), (1, 2))
     elif key.type in (Type.NUMBER, Type.NUMBER_OR_MAP):
-        yield from ((0.11, 0.23), (1.5, 2.5), (-0.4, -0.2))
+        yield from ((0.11, 0.23), (1.5, 2.5), (-0.4, -0.2), (0.0011, 0.0023))
     elif key.type is Type.VECTOR:
         yield {"x": 0.1, "y": 0.2, "z": 0.3}, {"x": 0.3, "y": 0.1, "z": 0.2}
     elif key.type is Type.RPY:
