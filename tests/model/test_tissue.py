@@ -252,3 +252,30 @@ def test_round_shapes_are_filled(tmp_path: Path, shape: str) -> None:
     ball, height = 4 / 3 * np.pi * 0.02**3, np.pi * 0.02**2 * 0.05
     volume = {"SPHERE": ball, "CYLINDER": height, "CAPSULE": np.pi * 0.02**2 * 0.01 + ball, "CONE": height / 3}[shape]
     assert form.grid.sizes.prod(axis=1).sum() == pytest.approx(volume, rel=0.08)
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    least=st.floats(1.5, 3.0), damping=st.floats(0.9, 1.5), other=st.floats(0.05, 0.9), share=st.floats(1.01, 1.4),
+    first=st.booleans(),
+)  # fmt: skip
+def test_free_tissue_is_refused_where_its_mass_is_lost_in_its_stiffness(
+    tmp_path_factory: pytest.TempPathFactory, least: float, damping: float, other: float, share: float, first: bool
+) -> None:
+    """Of two layers the one counts that is stiffer for its density, wherever it lies."""
+
+    def free(young: float, density: float) -> Scene:
+        hard, soft = (
+            f"      - {{thickness: 0.005, youngs modulus: {e!r}, density: {rho!r}, damping time: {damping!r}}}\n"
+            for e, rho in ((young, density), (young * other, 2.0 * density / other))
+        )
+        layers = f"{LINE}    fixed: []\n    layers:\n{hard + soft if first else soft + hard}"
+        return load(tmp_path_factory.mktemp("m"), PAD.replace("mass: 0.0", "mass: 1").replace(LINE, layers))
+
+    (sound,) = free(1e5, 1e3).tissues
+    cell = float(sound.form.grid.sizes.min())
+    young = least * tissue.STIFF_OVER_HEAVY * (cell / tissue.SETTLING) ** 2 / (1.0 + damping / tissue.SETTLING)
+    for density, refused in ((least / share, True), (least * share, False)):
+        scene = free(young, density)
+        told = any("too little for a Young's modulus" in d.message for d in scene.diagnostics)
+        assert told == refused == (not scene.tissues), scene.diagnostics
