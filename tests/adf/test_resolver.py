@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import ligature
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from ligature.adf import ResolutionError, Resolver
 from ligature.adf.resolver import MAX_LAUNCH_BYTES, MAX_LAUNCH_FILES, SEARCH_PATH, scene_root
+from ligature.render.visuals import VisualLoader
+
+from tests.fuzz.seeds import MTL, OBJ
 
 
 @pytest.fixture
@@ -119,6 +124,91 @@ def test_bytes_that_are_no_text_state_where(lab: Path) -> None:
     (lab / "bad.yaml").write_bytes(b"name: \xff\xfe")
     with pytest.raises(ResolutionError, match=r"is not UTF-8 text \(byte 6\)"):
         Resolver([lab]).read_text(lab / "bad.yaml")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("flow", [False, True])
+def test_a_launch_file_is_recognised_in_every_encoding(lab: Path, encoding: str, newline: str, flow: bool) -> None:
+    """Else files that it names lie outside the scene."""
+    model = lab.parent / "plain" / "scene" / "models" / "m.yaml"
+    model.parent.mkdir(parents=True)
+    model.write_text("bodies: []\n")
+    lines = ["multibody configs: [models/m.yaml]", "world config: w.yaml", ""]
+    text = "{" + ", ".join(lines[:2]) + "}" if flow else newline.join(lines)
+    (model.parent.parent / "launch.yaml").write_bytes(text.encode(encoding))
+    assert scene_root(model) == lab.parent / "plain"
+
+
+STORES = {
+    "git-annex": ".git/annex/objects/aa/bb/SHA256E-s12--{hash}{suffix}/SHA256E-s12--{hash}{suffix}",
+    "DVC": ".dvc/cache/files/md5/aa/{hash}", "hub": "blobs/{hash}",
+}  # fmt: skip
+"""Where programs keep a file; scenes have links to it."""
+
+
+@pytest.mark.parametrize("store", STORES)
+@pytest.mark.parametrize("linked", ["all", "meshes"])
+def test_a_scene_of_links_into_a_store_is_read_by_the_names_of_the_links(
+    tmp_path: Path, store: str, linked: str
+) -> None:
+    files = {
+        "ADF/launch.yaml": "world config: w.yaml\nmultibody configs: [models/m.yaml]\n", "ADF/w.yaml": "lights: []\n",
+        "ADF/models/m.yaml": "bodies: [B]\nB: {name: b, mass: 1, mesh: ../../meshes/part.obj, collision mesh type: CONVEX_HULL}\n",
+        "meshes/part.obj": OBJ, "meshes/part.mtl": MTL, "meshes/red.png": "a picture",
+    }  # fmt: skip
+    for name, text in files.items():
+        link = tmp_path / "scene" / name
+        link.parent.mkdir(parents=True, exist_ok=True)
+        digest = hashlib.md5(name.encode()).hexdigest()
+        kept = tmp_path / "scene" / STORES[store].format(hash=digest, suffix=link.suffix)
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        if linked == "all" or link.suffix in (".obj", ".mtl", ".png"):
+            kept.write_text(text)
+            link.symlink_to(os.path.relpath(kept, link.parent))
+        else:
+            link.write_text(text)
+    scene = ligature.load(tmp_path / "scene" / "ADF" / "launch.yaml", roots=[tmp_path / "scene"])
+    (body,) = scene.bodies
+    assert [len(collider.shape.vertices) for collider in body.colliders] == [8, 6]  # type: ignore[union-attr]
+    (red, _) = VisualLoader(scene.roots).of_scene(scene)
+    assert red.surface.texture is not None and red.surface.texture.read_text() == "a picture"
+
+
+@given(st.sampled_from(["", "textures", "../textures", "../../assets/a b"]), st.sampled_from(["", "../materials"]))
+def test_textures_and_materials_may_lie_anywhere_below_the_scenes_roots(pictures: str, materials: str) -> None:
+    with TemporaryDirectory() as place:
+        meshes = Path(place, "scene", "ADF", "high_res")
+        for folder in (meshes, meshes / pictures, meshes / materials):
+            folder.mkdir(parents=True, exist_ok=True)
+        (meshes / "part.obj").write_text(OBJ.replace("part.mtl", f"{materials or '.'}/part.mtl"))
+        (meshes / materials / "part.mtl").write_text(MTL.replace("red.png", f"{pictures or '.'}/wood.png"))
+        (meshes / pictures / "wood.png").write_text("a picture")
+        model = meshes.parent / "m.yaml"
+        model.write_text(
+            "bodies: [B]\nhigh resolution path: high_res\nB: {name: b, mass: 1, mesh: part.obj, collision mesh: ''}\n"
+        )
+        scene = ligature.load(model, roots=[Path(place)])
+        loader = VisualLoader(scene.roots)
+        (red, _) = loader.of_scene(scene)
+        assert loader.problems == []
+        assert red.surface.texture is not None and red.surface.texture.read_text() == "a picture"
+
+
+def test_a_link_of_another_name_leads_to_the_scene_around_the_file(lab: Path) -> None:
+    """As someone makes who starts one scene often."""
+    (lab / "package.xml").write_text("<package/>")
+    (lab.parent / "mine.yaml").symlink_to(lab / "launch.yaml")
+    assert Resolver.for_file(lab.parent / "mine.yaml").roots == (lab,)
+    assert Resolver([lab]).allow(lab.parent / "mine.yaml") == lab / "launch.yaml"
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-32"])
+def test_text_that_is_cut_short_states_its_encoding_and_where(lab: Path, encoding: str) -> None:
+    (lab / "bad.yaml").write_bytes("a: 1\nb: 2".encode(encoding)[:-1])
+    with pytest.raises(ResolutionError, match=rf"is not {encoding.upper()} text") as caught:
+        Resolver([lab]).read_text(lab / "bad.yaml")
+    assert caught.value.diagnostic.mark is not None and caught.value.diagnostic.mark.line == 2
 
 
 NAMES = st.sampled_from(["ADF", "meshes", "descriptions", "multi-bodies", "robots", "b c", "d"])

@@ -6,6 +6,7 @@ AMBF; symbolic links are resolved before the roots are compared.
 
 from __future__ import annotations
 
+import codecs
 import os
 import re
 from collections import abc
@@ -25,9 +26,17 @@ MAX_PATH, MAX_NAME = 4000, 255
 
 SEARCH_PATH = "LIGATURE_SCENE_PATH"
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
+_HASH = re.compile("[0-9a-f]{16}")
+"""What the names in stores of contents have."""
+
 _ROOT_SIGNS = (".git", "package.xml")
 _LAUNCH_KEYS = ("world config", "color config", "input devices config", "multibody configs")
-_LAUNCH_SIGN = re.compile(rb"^[ \t]*['\"]?(?:multibody configs|world config)", re.MULTILINE)
+_LAUNCH_SIGN = re.compile(r"(?:^|[\r\n{,])[ \t]*['\"]?(?:multibody configs|world config)")
+_MARKED = (
+    (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"),
+)  # fmt: skip
+"""Byte order marks of encodings that YAML allows besides UTF-8, as Windows writes them; the longer ones first."""
 MAX_LAUNCH_FILES, MAX_LAUNCH_BYTES = 200, 1024 * 1024
 """Most files of a folder, and the largest in bytes, that are looked at for being a launch file."""
 
@@ -74,13 +83,25 @@ class Resolver:
         return self.allow(Path(os.path.join(base, reference)), mark)
 
     def allow(self, path: Path, mark: Mark | None = None) -> Path:
-        """``path`` with links resolved, if it lies below a root; raises `ResolutionError` at ``mark``."""
+        """``path`` with links resolved, if it lies below a root; raises `ResolutionError` at ``mark``.
+
+        A link into a store of contents keeps its name and folder (`place_of`), where both it and the content lie below.
+        """
+        real = self._real(path, mark)
+        place = place_of(path, real)
+        return place if self._covers(place) else real
+
+    def _covers(self, path: Path) -> bool:
+        return any(path == root or root in path.parents for root in self.roots)
+
+    def _real(self, path: Path, mark: Mark | None) -> Path:
+        """``path`` with all links resolved, if it lies below a root."""
         if "\0" in str(path):
             raise self._refusal("the path contains a zero byte", mark, "write the path without it")
         if len(str(path)) > MAX_PATH or any(len(part.encode("utf-8", "replace")) > MAX_NAME for part in path.parts):
             raise self._refusal(f"the path '{str(path)[:60]}…' is too long for a file", mark, "give a shorter one")
         real = real_path(path)
-        if not any(real == root or root in real.parents for root in self.roots):
+        if not self._covers(real):
             roots = ", ".join(map(str, self.roots))
             lack = lack_of(real)
             if lack is not None and not real.is_dir():
@@ -102,7 +123,7 @@ class Resolver:
 
     def read_bytes(self, path: Path, limit: int = MAX_BYTES, mark: Mark | None = None) -> bytes:
         """The content of ``path``, at most ``limit`` bytes; raises `ResolutionError` at ``mark``."""
-        real = self.allow(path, mark)
+        real = self._real(path, mark)
         try:
             lack = lack_of(real)
             if lack is not None:
@@ -115,18 +136,19 @@ class Resolver:
             raise self._refusal(f"'{real}' cannot be read: {error.strerror}", mark, "give another file") from error
 
     def read_text(self, path: Path, limit: int = MAX_BYTES, mark: Mark | None = None) -> str:
-        """The content of ``path`` as UTF-8 text, at most ``limit`` bytes.
+        """The content of ``path`` as text, at most ``limit`` bytes: UTF-8, or what its byte order mark states.
 
-        Raises `ResolutionError` at ``mark``, or at the byte that is not UTF-8.
+        Raises `ResolutionError` at ``mark``, or at the byte that is not text.
         """
         data = self.read_bytes(path, limit, mark)
         try:
-            return data.decode("utf-8-sig")
+            return decoded(data)
         except UnicodeDecodeError as error:
-            before = data[: error.start].split(b"\n")
-            place = Mark(Path(path), len(before), len(before[-1].decode("utf-8", "replace")) + 1)
+            name = "-".join(error.encoding.upper().split("-")[:2])
+            before = data[: error.start].decode(error.encoding, "replace").lstrip("\ufeff").split("\n")
+            place = Mark(Path(path), len(before), len(before[-1]) + 1)
             raise self._refusal(
-                f"'{path}' is not UTF-8 text (byte {error.start})", place, "save it as UTF-8"
+                f"'{path}' is not {name} text (byte {error.start})", place, "save it as UTF-8"
             ) from error
 
     def _wider_root(self, path: Path) -> Path:
@@ -140,6 +162,11 @@ class Resolver:
         return ResolutionError(Diagnostic(Severity.ERROR, message, mark, hint, "path"))
 
 
+def decoded(data: bytes) -> str:
+    """The text of a scene file: UTF-8, or what its byte order mark states; raises UnicodeDecodeError."""
+    return data.decode(next((encoding for mark, encoding in _MARKED if data.startswith(mark)), "utf-8-sig"))
+
+
 def scene_root(path: Path) -> Path:
     """The folder below which the scene of ``path``, the file that the user named, may open files.
 
@@ -147,7 +174,7 @@ def scene_root(path: Path) -> Path:
     the highest launch file around it which names a file of the same branch: that launch file may open the same
     folder. Else the folder above the file's own. Never all of a disk, nor what lies above the user's home.
     """
-    folder = real_path(path).parent
+    folder = place_of(path, real_path(path)).parent
     for candidate in (folder, *folder.parents):
         if any((candidate / sign).exists() for sign in _ROOT_SIGNS):
             return candidate
@@ -156,6 +183,17 @@ def scene_root(path: Path) -> Path:
         if not _too_wide(candidate) and _launches(candidate, branch):
             scene = candidate
     return scene if scene.parent == scene.parent.parent or _above_home(scene.parent) else scene.parent
+
+
+def place_of(path: Path, real: Path) -> Path:
+    """Where the file of ``path`` is, which is ``real`` with links followed, but for a link into a store of contents.
+
+    Version control of large files (git-annex, DVC) and hubs of data sets keep files under the hash of their content,
+    and link to them by the right names: the format and the neighbours of such a file are those of the link.
+    """
+    if real.name == path.name or not _HASH.search(real.name) or not os.path.islink(path):
+        return real
+    return real_path(path.parent) / path.name
 
 
 def _too_wide(folder: Path) -> bool:
@@ -185,10 +223,10 @@ def _named_files(launch: Path) -> list[Path]:
     try:
         if not launch.is_file() or launch.stat().st_size > MAX_LAUNCH_BYTES:
             return []
-        data = launch.read_bytes()
-        if not _LAUNCH_SIGN.search(data):
+        text = decoded(launch.read_bytes())
+        if not _LAUNCH_SIGN.search(text):
             return []
-        top = parse(data.decode("utf-8-sig"), launch)
+        top = parse(text, launch)
     except (OSError, UnicodeDecodeError, AdfError):
         return []
     named = []

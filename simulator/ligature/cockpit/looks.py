@@ -43,7 +43,7 @@ METAL_SHEEN = 0.6
 
 def body_looks(scene: Scene) -> dict[int, bytes]:
     """Binary glTF of every drawn rigid body and ghost by owner: bodies, then ghosts, counted through."""
-    loader = VisualLoader()
+    loader = VisualLoader(scene.roots)
     owners: dict[int, list[Piece]] = {}
     soft = {tissue.body for tissue in scene.tissues}
     for piece in loader.of_scene(scene):
@@ -58,7 +58,7 @@ def thread_colour(scene: Scene, body: int) -> tuple[int, int, int]:
     from ligature.render.surface import surface_of
 
     visual = scene.bodies[body].visual
-    return mean_colour(surface_of(visual.colour, VisualLoader().material(visual)))
+    return mean_colour(surface_of(visual.colour, VisualLoader(scene.roots).material(visual)))
 
 
 def mean_colour(surface: Surface) -> tuple[int, int, int]:

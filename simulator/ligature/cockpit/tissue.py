@@ -35,7 +35,7 @@ class TissueStage:
 
     def __init__(self, server: ViserServer, scene: Scene) -> None:
         rest = new_state(scene)["tissue_node"][0]
-        self._surfaces = tissue_surfaces(scene, VisualLoader().of_scene(scene), FINENESS)
+        self._surfaces = tissue_surfaces(scene, VisualLoader(scene.roots).of_scene(scene), FINENESS)
         self._meshes = [
             server.scene.add_mesh_simple(
                 f"/tissue/{number}", surface.places(rest).astype(np.float32), surface.smooth_faces.astype(np.uint32),

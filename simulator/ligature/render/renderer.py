@@ -89,7 +89,7 @@ class Renderer:
         wanted = SAMPLES if samples is None else samples
         self._samples = 0 if self._smoothed else min(wanted, self._context.max_samples)
         self._programs = Programs(self._context)
-        loader = VisualLoader()
+        loader = VisualLoader(scene.roots)
         self.problems: list[AdfError] = loader.problems
         self._textures = Textures(self._context, self.problems)
         self._targets: list[Target] = []

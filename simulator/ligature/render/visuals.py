@@ -5,7 +5,7 @@ Pieces stand in the frame of their owner; owners are bodies, then ghosts, counte
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import AdfError, Resolver
-from ligature.mesh import Material, Mesh, MeshError, MeshPart, load_mesh
+from ligature.mesh import Material, Mesh, MeshPart, load_mesh
 from ligature.mesh.surface import joined, open_edges, shells
 from ligature.model.scene import Scene
 from ligature.model.shapes import Capsule, Cone, Cylinder, Hull, Plane, ShaderFiles, Shape, Sphere, TriMesh, Visual
@@ -47,10 +47,14 @@ class Piece:
 
 
 class VisualLoader:
-    """Loads the pieces of owners; each mesh file is read once. ``problems`` states which could not be."""
+    """Loads the pieces of owners; each mesh file is read once. ``problems`` states which could not be.
 
-    def __init__(self) -> None:
+    ``roots`` are those of the scene: material libraries and textures may lie anywhere below them.
+    """
+
+    def __init__(self, roots: Sequence[Path] = ()) -> None:
         self.problems: list[AdfError] = []
+        self._roots = tuple(roots)
         self._meshes: dict[Path, _Loaded | None] = {}
 
     def of_scene(self, scene: Scene) -> list[Piece]:
@@ -88,10 +92,10 @@ class VisualLoader:
     def _mesh(self, path: Path) -> _Loaded | None:
         if path not in self._meshes:
             try:
-                mesh = load_mesh(path, Resolver([path.parent]))
+                mesh = load_mesh(path, Resolver([*self._roots, path.parent]))
                 self.problems += [AdfError(found) for found in mesh.diagnostics if found.message.startswith("texture")]
                 self._meshes[path] = _Loaded(mesh)
-            except MeshError as error:
+            except AdfError as error:
                 self.problems.append(error)
                 self._meshes[path] = None
         return self._meshes[path]
