@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from ligature.adf import Document, Resolver, Severity, read_any, read_launch, read_model
 
 
@@ -174,3 +177,30 @@ def test_of_all_keys_of_real_files_only_slips_are_unknown(corpus: Path) -> None:
         "pr2 gripper resistive.yaml: unknown key 'SENSOR Proximity0' in sensor 'RP0'",
         "cylinder.yaml: unknown keys 'location.x', 'location.y', 'location.z' in sensor 'SENSOR Proximity'",
     ]
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=8), st.sampled_from(["", "~", "{a: 1}", "[1]"]), st.booleans())
+def test_an_item_of_a_list_that_is_no_name_costs_only_itself(sound: list[bool], odd: str, launch: bool) -> None:
+    with TemporaryDirectory() as place:
+        file = Path(place, "m.yaml")
+        key = "multibody configs" if launch else "bodies"
+        lines = [f"  - {f'b{i}' if good else odd}" for i, good in enumerate(sound)]
+        bodies = "".join(f"b{i}: {{name: b{i}, mass: 1}}\n" for i in range(len(sound)))
+        file.write_text(f"{key}:\n" + "\n".join(lines) + "\n" + ("" if launch else bodies))
+        document = read_any(file, Resolver([file.parent]))
+        wrong = [d for d in document.diagnostics if d.message.startswith(f"an item of '{key}' is not")]
+        assert [d.mark.line for d in wrong if d.mark] == [i + 2 for i, good in enumerate(sound) if not good]
+        assert all(d.severity is Severity.ERROR for d in wrong)
+        if launch:
+            assert [model.text for model in document.models] == [
+                f"b{i}" if good else "" for i, good in enumerate(sound)
+            ]
+        else:
+            assert [body.key for body in document.elements("bodies")] == [
+                f"b{i}" for i, good in enumerate(sound) if good
+            ]
+
+
+@pytest.mark.parametrize("line", ["collision margin:", "scale: ~", "passive: null", "friction: {static: }"])
+def test_a_key_without_a_value_is_reported_as_such(model, line: str) -> None:
+    assert "but no value stands here; remove the key to have its default" in messages(model(BODY + f"  {line}\n"))[0]

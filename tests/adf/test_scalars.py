@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+import sys
+import unicodedata
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from ligature.adf import scalars
 
 
@@ -58,3 +62,29 @@ def test_one_and_zero_are_not_truth_values(text: str) -> None:
 def test_zero_is_unsigned_and_octal_has_all_eight_digits() -> None:
     assert scalars.unsigned("0") == 0
     assert scalars.integer("001234567") == 0o1234567
+
+
+DIGITS = [chr(code) for code in range(128, sys.maxunicode + 1) if unicodedata.category(chr(code)) == "Nd"]
+
+
+@given(st.text("0123456789.e+-", max_size=3), st.sampled_from(DIGITS), st.text("0123456789", max_size=3))
+def test_digits_of_other_scripts_make_no_number(before: str, digit: str, behind: str) -> None:
+    for rule in (scalars.number, scalars.integer, scalars.unsigned):
+        with pytest.raises(ValueError, match="number"):
+            rule(before + digit + behind)
+
+
+@given(st.integers(-(2**34), 2**34) | st.integers(), st.sampled_from(["", " ", "\t", "\n"]))
+def test_whole_numbers_have_32_bits(value: int, blank: str) -> None:
+    """As in AMBF, and as what takes them expects."""
+    for rule, least, most in ((scalars.integer, -(2**31), 2**31 - 1), (scalars.unsigned, 0, 2**32 - 1)):
+        if least <= value <= most:
+            assert rule(f"{value}{blank}") == value
+        else:
+            with pytest.raises(ValueError, match="a whole number"):
+                rule(f"{value}{blank}")
+
+
+def test_an_endless_whole_number_is_refused_at_once() -> None:
+    with pytest.raises(ValueError, match="at most 40 digits"):
+        scalars.integer("1" * 1_000_000)

@@ -166,7 +166,19 @@ class _Hand:
     def _remark(self, pad: str) -> str:
         if self.rng.random() >= self.comment:
             return ""
-        return self.rng.choice(("\n", f"{pad}{self.rng.choice(COMMENTS)}\n", "   \n", f"{self.rng.choice(COMMENTS)}\n"))
+        remark = self.rng.choice(COMMENTS)
+        return self.rng.choice(
+            (
+                "\n",
+                f"{pad}{remark}\n",
+                "   \n",
+                f"{remark}\n",
+                "\t\n",
+                f"{pad}\t \n",
+                f"\t{remark}\n",
+                f"{pad}\t{remark}\n",
+            )
+        )
 
 
 def _plain(text: str) -> bool:

@@ -126,6 +126,10 @@ def _check_converted(key: Key, value: Node, element: Element, found: list[Diagno
     except BadValue as error:
         found.append(_bad(element, key, error))
         return
+    if key.type is Type.INTEGERS and isinstance(value, Scalar) and not value.null:
+        message = f"'{key.path}' of {element.kind} '{element.key}' is one value; a list was expected"
+        hint = f"write [{shortened(value.text)}]; as it stands it has no effect"
+        found.append(Diagnostic(Severity.WARNING, message, value.mark, hint, "unknown"))
     if key.type is Type.MAPS and isinstance(value, Sequence):
         for item in value.items:
             if isinstance(item, Mapping):
@@ -137,10 +141,13 @@ def _check_converted(key: Key, value: Node, element: Element, found: list[Diagno
 
 
 def _check_vector(key: Key, value: Mapping, element: Element, found: list[Diagnostic]) -> None:
-    """Report keys other than x y z, r p y, position and orientation, which are not read."""
-    wanted = _VECTOR_KEYS[key.type]
+    """Check keys beside x y z, r p y, position and orientation that the schema has, and report the others."""
+    wanted, known = _VECTOR_KEYS[key.type], BY_PATH[element.kind]
     found += repeated_keys(value)
-    unknown = [n for n in value.entries if n not in wanted and f"{key.path}.{n}" not in BY_PATH[element.kind]]
+    for name, (_, beside) in value.entries.items():
+        if name not in wanted and f"{key.path}.{name}" in known:
+            _check_value(known[f"{key.path}.{name}"], beside, element, found)
+    unknown = [name for name in value.entries if name not in wanted and f"{key.path}.{name}" not in known]
     if unknown:
         names = ", ".join(f"'{key.path}.{shortened(name)}'" for name in unknown[:MAX_NAMED])
         more = f" and {len(unknown) - MAX_NAMED} more" if len(unknown) > MAX_NAMED else ""

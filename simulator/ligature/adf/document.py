@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from ligature.adf.diagnostics import Diagnostic, Mark, Severity
 from ligature.adf.nodes import Mapping, Node, Sequence, plain
-from ligature.adf.schema import BY_PATH, LISTS, SCHEMA, Fault, Key, Type
+from ligature.adf.schema import BY_PATH, LISTS, SCHEMA, Fault, Key, Status, Type
 from ligature.adf.values import BadValue, Vector, convert
 
 
@@ -57,7 +57,7 @@ class Element:
         try:
             return convert(key, node)
         except BadValue:
-            if key.fault is Fault.VALUE:
+            if key.fault is Fault.VALUE or key.status is Status.IGNORED:  # the values of the latter are not checked
                 return key.default
             raise
 

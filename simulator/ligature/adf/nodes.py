@@ -96,7 +96,7 @@ def parse(text: str, file: Path) -> Mapping:
         return _Composer(text, Relaxed(text), file).document()
     except yaml.YAMLError as strict_error:
         relaxed = relax(text)
-        if not relaxed.lines and not relaxed.anchors:
+        if relaxed.text == text:
             raise AdfError(_yaml_diagnostic(strict_error, Relaxed(text), file)) from strict_error
         try:
             return _Composer(text, relaxed, file).document()

@@ -34,6 +34,9 @@ MAX_TEXT = 64 * 1024 * 1024
 REFUSING = ("value", "missing", "version")
 """Codes of the findings for which AMBF refuses a whole file."""
 
+MODELS = "multibody configs"
+"""Key of the list of model files of a launch file."""
+
 _DEFAULTED = ("body", "camera", "light")
 """Kinds of which AMBF makes a default object when one is listed but not defined."""
 
@@ -164,7 +167,7 @@ def _launch(source: _Source, resolver: Resolver, strict: bool) -> LaunchDocument
     launch.world = _reference(launch, "world config", resolver)
     launch.devices = _reference(launch, "input devices config", resolver)
     launch.colours = _reference(launch, "color config", resolver)
-    node = launch.top.node.get("multibody configs")
+    node = launch.top.node.get(MODELS)
     if isinstance(node, Sequence):
         launch.models = tuple(_resolved(item, launch.path.parent, resolver) for item in node.items)
     return launch
@@ -189,12 +192,26 @@ def _top(source: _Source, kind: str) -> tuple[Element, list[Diagnostic]]:
     found = [*repeated_keys(source.root), *missing_keys(element)]
     sound = {}
     for name, entry in own.items():
-        of_key = key_problems(element, name)
+        listing = isinstance(entry[1], Sequence) and (name in LISTS or name == MODELS)
+        of_key = _unnamed(element, name, entry[1]) if listing else key_problems(element, name)
         found += of_key
-        if not errors(of_key):
+        if listing or not errors(of_key):
             sound[name] = entry
     top = Element(kind, source.path.name, replace(source.root, entries=sound, duplicates=[]))
     return top, [*found, *rule_findings(top)]
+
+
+def _unnamed(element: Element, name: str, listing: Node) -> list[Diagnostic]:
+    """Errors about the items of a list of names that are none; the others are used."""
+    assert isinstance(listing, Sequence)
+    others = [item for item in listing.items if not isinstance(item, Scalar) or item.null]
+    return [_no_name(name, item) for item in others[:MAX_FINDINGS]]
+
+
+def _no_name(name: str, item: Node) -> Diagnostic:
+    what = "a path" if name == MODELS else "the name of an object"
+    message = f"an item of '{name}' is not {what}"
+    return Diagnostic(Severity.ERROR, message, item.mark, f"write {what} or remove the item", "value")
 
 
 def _listed(root: Mapping, kind: str) -> set[str]:
@@ -250,7 +267,7 @@ def _elements(document: Document, list_name: str, strict: bool) -> tuple[Element
     checked: dict[str, Element | None] = {}
     elements = []
     for item in node.items if isinstance(node, Sequence) else []:
-        if not isinstance(item, Scalar):
+        if not isinstance(item, Scalar) or item.null:
             continue
         if len(document.diagnostics) > MAX_FINDINGS:
             message = f"more than {MAX_FINDINGS} findings; the rest of the file is not read"
@@ -333,8 +350,7 @@ def _reference(document: Document, name: str, resolver: Resolver) -> Reference |
 
 def _resolved(node: Node, base: Path, resolver: Resolver) -> Reference:
     if not isinstance(node, Scalar) or node.null:
-        diagnostic = Diagnostic(Severity.ERROR, "a path was expected", node.mark, "", "path")
-        return Reference("", None, node.mark, diagnostic)
+        return Reference("", None, node.mark, _no_name(MODELS, node))
     try:
         path = resolver.resolve(node.text, base, node.mark)
     except ResolutionError as error:

@@ -1,8 +1,10 @@
-"""Makes text readable that yaml-cpp reads and libyaml refuses: little indented flow collections, names of anchors.
+"""Makes text readable that yaml-cpp reads and libyaml refuses: little indented flow collections, tabs, anchors.
 
 YAML requires the lines of a ``{…}`` or ``[…]`` to be indented deeper than their key. yaml-cpp does not check this, and
 real files rely on it (as in AMBF). Spaces are inserted only at line starts, so that every line and column
 of the original can be computed. Lines and columns count from 0, as in YAML libraries.
+
+YAML allows tabs in lines that are blank or a comment, which editors leave there; libyaml does not. Blanks replace them.
 
 YAML's anchors may have any character but blanks and brackets in their names, as ``&psm.jaw`` and ``&größe``; libyaml
 knows letters, digits, ``-`` and ``_``. Such names are replaced by others as long.
@@ -38,8 +40,8 @@ class Relaxed:
 
 
 def relax(text: str) -> Relaxed:
-    """``text`` with the lines inside flow collections indented, and with names of anchors that libyaml knows."""
-    text, anchors = _renamed(text)
+    """``text`` with the lines inside flow collections indented, and tabs in empty lines and odd anchors replaced."""
+    text, anchors = _renamed(_TABS.sub(lambda found: " " * len(found[0]), text))
     lines = text.split("\n")
     inserted: list[int] = []
     depth = 0
@@ -53,6 +55,10 @@ def relax(text: str) -> Relaxed:
         if stripped and not stripped.startswith("#"):
             opens_value = depth == 0 and _ends_open(stripped)
     return Relaxed("\n".join(lines), inserted, anchors)
+
+
+_TABS = re.compile(r"(?<![^\r\n])[ \t]*\t[ \t]*(?=[#\r\n]|\Z)")
+"""The beginning of a line that is blank or a comment, where it has a tab."""
 
 
 def _renamed(text: str) -> tuple[str, dict[str, str]]:

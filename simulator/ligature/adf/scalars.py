@@ -8,8 +8,12 @@ from __future__ import annotations
 import math
 import re
 
-_DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
-_INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|\d+)\Z")
+_DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
+_INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|\d+)\Z", re.ASCII)
+_BLANKS = " \t\n\v\f\r"
+MOST_DIGITS = 40
+"""Longest whole number in characters; time to convert longer ones grows with their square."""
+
 _NOT_FINITE = {
     ".inf": math.inf, ".Inf": math.inf, ".INF": math.inf,
     "+.inf": math.inf, "+.Inf": math.inf, "+.INF": math.inf,
@@ -22,7 +26,7 @@ _FALSE = ("false", "no", "off", "n")
 
 def number(text: str) -> float:
     """A double: decimal or exponent form, .inf or .nan; trailing blanks are tolerated."""
-    text = text.rstrip(" ")
+    text = text.rstrip(_BLANKS)
     if text in _NOT_FINITE:
         return _NOT_FINITE[text]
     if not _DECIMAL.match(text):
@@ -31,8 +35,28 @@ def number(text: str) -> float:
 
 
 def integer(text: str) -> int:
-    """A signed integer: decimal, 0x… or octal with a leading 0."""
-    text = text.rstrip(" ")
+    """A signed integer of 32 bits: decimal, 0x… or octal with a leading 0."""
+    return _within(_whole(text), -(2**31), 2**31 - 1)
+
+
+def unsigned(text: str) -> int:
+    """A whole number of 32 bits that is not negative."""
+    value = _whole(text)
+    if value < 0:
+        raise ValueError("a whole number that is not negative")
+    return _within(value, 0, 2**32 - 1)
+
+
+def _within(value: int, least: int, most: int) -> int:
+    if least <= value <= most:
+        return value
+    raise ValueError(f"a whole number from {least} to {most}")
+
+
+def _whole(text: str) -> int:
+    text = text.rstrip(_BLANKS)
+    if len(text) > MOST_DIGITS:
+        raise ValueError(f"a whole number of at most {MOST_DIGITS} digits")
     if not _INTEGER.match(text):
         raise ValueError("a whole number such as 10 or 0x0a")
     sign = -1 if text.startswith("-") else 1
@@ -44,14 +68,6 @@ def integer(text: str) -> int:
             raise ValueError("a whole number; a leading 0 means octal")
         return sign * int(digits, 8)
     return sign * int(digits)
-
-
-def unsigned(text: str) -> int:
-    """A whole number that is not negative."""
-    value = integer(text)
-    if value < 0:
-        raise ValueError("a whole number that is not negative")
-    return value
 
 
 def flag(text: str) -> bool:

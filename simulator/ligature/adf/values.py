@@ -47,7 +47,8 @@ def convert(key: Key, node: Node) -> Any:
         numbers = value[0] if key.type is Type.POSE else value if isinstance(value, tuple) else (value,)
         beyond = [n for n in numbers if isinstance(n, int | float) and abs(n) > key.most]
         if beyond:
-            raise BadValue(node, f"at most {key.most:g} {key.unit.split(',')[0]}, not {beyond[0]:g}", unusable=True)
+            unit = f" {key.unit.split(',')[0]}" if key.unit else ""
+            raise BadValue(node, f"at most {key.most:g}{unit}, not {beyond[0]:g}", unusable=True)
     return value
 
 
@@ -156,6 +157,8 @@ def _read(rule: Callable[[str], Any], node: Node) -> Any:
     try:
         value = rule(node.text)
     except (ValueError, OverflowError) as error:
+        if node.null:
+            raise BadValue(node, f"{error}, but no value stands here; remove the key to have its default") from error
         raise BadValue(node, f"{error}, not '{shortened(node.text)}'") from error
     if isinstance(value, float) and not abs(value) <= LARGEST:
         raise BadValue(node, f"a finite number below {LARGEST:g}, not '{shortened(node.text)}'", unusable=True)
