@@ -151,7 +151,7 @@ def test_the_corpus_needle_is_nine_pieces_in_bullet_and_not_one(cache: Collision
     "text",
     [
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -3\n",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -4\n",
         "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n",
         "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n",
     ],

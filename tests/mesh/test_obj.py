@@ -116,3 +116,26 @@ def test_a_hundred_thousand_triangles_take_less_than_seconds(read) -> None:
     (part,) = read("\n".join(lines)).parts
     assert len(part.faces) == 2 * (n - 1) ** 2
     assert time.process_time() - begin < 3.0  # 0.2 s when nothing else runs
+
+
+@pytest.mark.parametrize("words", ["", "1", "1 2"])
+def test_a_face_with_too_few_corners_is_left_out(read, words: str) -> None:
+    mesh = read(POINTS + f"f {words}\nf 1 2 3\n")
+    assert len(mesh.parts[0].faces) == 1
+    assert [(d.severity, d.message) for d in mesh.diagnostics] == [
+        (Severity.WARNING, "a face has fewer than 3 vertices and is left out")
+    ]
+
+
+@pytest.mark.parametrize("count", [256, 257, 2000])
+def test_a_cap_of_many_corners_is_a_fan(read, count: int) -> None:
+    """CAD exports close a fine cylinder by one face."""
+    angles = 2 * np.pi * np.arange(count) / count
+    lines = [f"v {x:.9f} {y:.9f} 0" for x, y in zip(np.cos(angles), np.sin(angles), strict=True)]
+    mesh = read("\n".join([*lines, "f " + " ".join(map(str, range(1, count + 1)))]))
+    corners = mesh.parts[0].vertices[mesh.parts[0].faces]
+    area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2].sum()
+    assert area == pytest.approx(0.5 * count * np.sin(2 * np.pi / count))
+    assert [d.message for d in mesh.diagnostics] == [
+        f"a face has {count} vertices; the reference reads at most 256" for _ in range(count > 256)
+    ]

@@ -49,9 +49,8 @@ def test_library_names_may_hold_blanks(read, tmp_path: Path) -> None:
     ("line", "text"),
     [
         ("f 1 2 9", r"bad.obj:20:1: error: a face names vertex 9, but 8 are defined so far; indices count from 1"),
-        ("f 1 2 -1", "a face names vertex -1, but 8"),
+        ("f 1 2 -9", "a face names vertex -9, but 8"),
         ("f 0 1 2", "a face names vertex 0, but 8"),
-        ("f 1 2", "a face has 2 vertices; 3 to 256 are allowed"),
         ("f 1/9 2 3", "a face names texture coordinate 9, but 2"),
         ("f 1 two 3", "'two' is not a face corner; write v, v/vt, v//vn or v/vt/vn"),
         ("v 1 2", "3 numbers were expected, 2 found"),

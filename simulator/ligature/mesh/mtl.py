@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +19,8 @@ and others write them for physically based rendering."""
 
 _TEXTURES = ("map_Kd", "map_Bump", "map_Pr", "map_Pm", "map_ao", "refl")
 """The last two are what shades from ambient light, and the sphere that a surface mirrors, which shaders call matcap."""
+
+_LINE_END = re.compile("\r\n|\r|\n")
 
 _OPTIONS = {
     "-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2,
@@ -36,7 +39,10 @@ class _Draft:
     textures: dict[str, Path] = field(default_factory=dict)
 
     def material(self) -> Material:
-        """The material; the reference lights ambient with Ka times Kd and takes ``Tr`` for ``d``."""
+        """The material; the reference lights ambient with Ka times Kd and takes ``Tr`` for ``d``.
+
+        Exporters that write both mean 1 - d by ``Tr``, so that ``d`` is right whatever ``Tr`` means.
+        """
         plain = Material(self.name)
         kd = self.colours.get("Kd", plain.diffuse)
         ka = self.colours.get("Ka")
@@ -46,7 +52,7 @@ class _Draft:
             diffuse=kd,
             specular=self.colours.get("Ks", plain.specular),
             shininess=self.scalars.get("Ns", plain.shininess),
-            alpha=min(self.scalars.get("alpha", plain.alpha), 1.0),
+            alpha=min(self.scalars.get("d", self.scalars.get("Tr", plain.alpha)), 1.0),
             texture=self.textures.get("map_Kd"),
             normal_map=self.textures.get("map_Bump"),
             emission=self.colours.get("Ke", plain.emission),
@@ -76,7 +82,7 @@ def read_mtl(text: str, path: Path, folder: Path, resolver: Resolver, findings: 
         Takes what has no effect.
     """
     drafts: list[_Draft] = []
-    for number, line in enumerate(text.split("\n"), 1):
+    for number, line in enumerate(_LINE_END.split(text), 1):
         words = line.split(None, 1)
         if not words or words[0].startswith("#"):
             continue
@@ -113,7 +119,7 @@ def _value(draft: _Draft, word: str, rest: str, path: Path, number: int, finding
     elif count == 3:
         draft.colours[word] = (_unit(values[0]), _unit(values[1]), _unit(values[2]))
     else:
-        draft.scalars["alpha" if word in ("d", "Tr") else word] = max(values[0], 0.0)
+        draft.scalars[word] = max(values[0], 0.0)
 
 
 def _unit(value: float) -> float:

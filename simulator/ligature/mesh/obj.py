@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.adf.diagnostics import Severity
 from ligature.adf.lacking import lack_of
 from ligature.adf.resolver import ResolutionError, Resolver
 from ligature.mesh.mesh import (
@@ -31,7 +32,7 @@ from ligature.mesh.mesh import (
 from ligature.mesh.mtl import read_mtl
 
 MAX_FACE_VERTICES = 256
-"""Most vertices of one face, the reference's own limit."""
+"""Most vertices of one face that the reference reads; more, as caps of CAD exports have, are noted."""
 
 MAX_LIBRARIES = 64
 MAX_INDEX_DIGITS = 32
@@ -39,6 +40,9 @@ MAX_INDEX_DIGITS = 32
 
 _IGNORED = frozenset(("o", "g", "s", "l", "p", "vp", "mg"))
 """Statements that are legal and do not matter for triangles by material."""
+
+_NUMERIC = frozenset(("v", "vt", "vn", "f"))
+"""Statements behind which a comment may stand; elsewhere a ``#`` may be part of a name."""
 
 _LIBRARY_NAME = re.compile(r"\S.*?\.mtl(?=\s|$)", re.IGNORECASE)
 
@@ -63,6 +67,8 @@ class _Reader:
         self.normals: list[list[float]] = []
         self.materials: list[Material] = []
         self.material_index: dict[str, int] = {}
+        self.unknown: dict[str, int] = {}
+        self.named_library = self.relative = False
         self.libraries: set[Path] = set()
         self.corners: dict[tuple[int, int, int], int] = {}
         self.spellings: dict[str, int] = {}
@@ -77,6 +83,8 @@ class _Reader:
             if not words:
                 continue
             word = words[0]
+            if "#" in line and word in _NUMERIC:
+                words = line.partition("#")[0].split()
             if word == "v":
                 self.points.append(self._numbers(words[1:4], 3))
                 self.point_lines.append(self.line)
@@ -106,7 +114,9 @@ class _Reader:
         index = self.material_index.get(name)
         if index is not None:
             self.current = index
-        elif self.materials:
+        elif not self.materials:
+            self.unknown.setdefault(name, self.line)
+        else:
             kept = self.materials[self.current].name
             self.findings.add(
                 self.path,
@@ -117,6 +127,7 @@ class _Reader:
 
     def _libraries(self, text: str) -> None:
         """Read the libraries of one ``mtllib`` line: one name that may hold blanks, or several names."""
+        self.named_library = True
         whole = self._library(text)
         names = [text] if whole else _LIBRARY_NAME.findall(text) or text.split()
         for name in names:
@@ -154,9 +165,13 @@ class _Reader:
 
     def _face(self, words: list[str]) -> None:
         count = len(words)
-        if not 3 <= count <= MAX_FACE_VERTICES:
-            allowed = f"3 to {MAX_FACE_VERTICES} are allowed"
-            raise failure(self.path, f"a face has {count} vertices; {allowed}", self.line, "triangulate the mesh")
+        if count < 3:
+            message = "a face has fewer than 3 vertices and is left out"
+            self.findings.add(self.path, message, self.line, "write an edge as 'l'")
+            return
+        if count > MAX_FACE_VERTICES:
+            message = f"a face has {count} vertices; the reference reads at most {MAX_FACE_VERTICES}"
+            self.findings.add(self.path, message, self.line, "triangulate the mesh", Severity.INFO)
         known = self.spellings
         corners = [known[word] if word in known else self._corner(word) for word in words]
         triangles = self.faces.setdefault(self.current, [])
@@ -187,22 +202,30 @@ class _Reader:
             -1 if vn is None else self._index(vn, len(self.normals), "normal"),
         )
         number = self.corners.setdefault(triple, len(self.corners))
-        self.spellings[word] = number
+        if "-" not in word:  # what a relative index means changes with every vertex
+            self.spellings[word] = number
         return number
 
     def _index(self, index: int, available: int, what: str) -> int:
         if 1 <= index <= available:
             return index - 1
+        if -available <= index < 0:
+            if not self.relative:
+                self.relative = True
+                message = "negative indices count back from the last vertex; the reference does not read them"
+                self.findings.add(self.path, message, self.line, severity=Severity.INFO)
+            return available + index
         raise failure(
             self.path,
             f"a face names {what} {index}, but {available} are defined so far",
             self.line,
-            "indices count from 1 and may not be negative",
+            "indices count from 1, or back from -1 for the last",
         )
 
     def _mesh(self) -> Mesh:
         if not self.points:
             raise failure(self.path, "the file holds no vertex", hint="export an object with faces")
+        self._report_unknown()
         points = checked(np.array(self.points, dtype=float), self.path, self.point_lines)
         uvs = self._finite(self.uvs, 2, "texture coordinates")
         normals = self._finite(self.normals, 3, "normals")
@@ -215,6 +238,17 @@ class _Reader:
         if not self.faces:
             parts[0] = replace(parts[0], vertices=points)
         return Mesh(self.path, tuple(parts), self.findings.all(), points)
+
+    def _report_unknown(self) -> None:
+        """State that several materials are one part because no library, or only a later one, defines them."""
+        if len(self.unknown) > 1 and (self.materials or not self.named_library):
+            last, line = list(self.unknown.items())[-1]
+            message = (
+                f"{len(self.unknown)} materials up to '{last[:80]}' are used before a material library defines them"
+            )
+            self.findings.add(
+                self.path, message, line, "name it by 'mtllib' first; without it their faces are one part"
+            )
 
     def _finite(self, rows: list[list[float]], columns: int, what: str) -> Array | None:
         """Rows as an array (n, columns), or None when there are none or some are not finite."""
