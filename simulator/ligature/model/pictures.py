@@ -7,6 +7,7 @@ import warnings
 import zlib
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "PPM", "WEBP")
@@ -21,7 +22,7 @@ class PictureError(ValueError):
 
 
 def read_picture(path: Path) -> Image.Image:
-    """The picture ``path`` in memory; raises `PictureError`, and FileNotFoundError."""
+    """The picture ``path`` in memory, of 8 bits a colour; raises `PictureError`, and FileNotFoundError."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of metadata that nobody asked for, and of sizes that are checked here
@@ -30,8 +31,7 @@ def read_picture(path: Path) -> Image.Image:
                 if width * height > MOST_PIXELS:
                     raise PictureError(f"has {width} × {height} pixels; the maximum is {MOST_PIXELS}")
                 picture.load()
-                whole: Image.Image = picture.copy()
-                return whole
+                return _eight_bits(picture.copy())
     except FileNotFoundError:
         raise
     except Image.DecompressionBombError:
@@ -43,3 +43,14 @@ def read_picture(path: Path) -> Image.Image:
         EOFError, AssertionError, struct.error, zlib.error,
     ) as error:  # fmt: skip
         raise PictureError(str(error) or type(error).__name__) from None
+
+
+def _eight_bits(picture: Image.Image) -> Image.Image:
+    """``picture``, of which 16 bits of grey, and grey from 0 to 1, have become 8 bits: Pillow would cut them off."""
+    if picture.mode.startswith("I"):
+        return Image.fromarray((np.asarray(picture, dtype=np.int64) >> 8).clip(0, 255).astype(np.uint8))
+    if picture.mode == "F":
+        values = np.nan_to_num(np.asarray(picture, dtype=float))
+        scale = 255.0 if values.max(initial=0.0) <= 1.0 else 1.0
+        return Image.fromarray(np.rint(scale * values).clip(0.0, 255.0).astype(np.uint8))
+    return picture

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import moderngl
-import numpy as np
 from PIL import Image
 
 from ligature.adf import AdfError, Diagnostic, Mark, Severity
@@ -38,7 +37,7 @@ class Textures:
 
     def _load(self, path: Path) -> moderngl.Texture | None:
         try:
-            image = _eight_bits(read_picture(path)).convert("RGBA").transpose(Image.Transpose.FLIP_TOP_BOTTOM)
+            image = read_picture(path).convert("RGBA").transpose(Image.Transpose.FLIP_TOP_BOTTOM)
         except FileNotFoundError:
             return None  # as the mesh reader has stated
         except (OSError, ValueError) as error:
@@ -51,10 +50,3 @@ class Textures:
         texture.build_mipmaps()
         texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         return texture
-
-
-def _eight_bits(picture: Image.Image) -> Image.Image:
-    """``picture``, of which 16 bits of grey have become 8, where Pillow's own conversion would cut them off."""
-    if not picture.mode.startswith("I"):
-        return picture
-    return Image.fromarray((np.asarray(picture, dtype=np.uint32) >> 8).clip(0, 255).astype(np.uint8))
