@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from ligature.adf import Diagnostic, Severity
 from ligature.cli.check import findings
 from ligature.cli.main import app
+from PIL import Image
 from typer.testing import CliRunner
 
 TRIANGLE = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl a\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
@@ -146,3 +147,40 @@ def test_a_missing_shader_is_reported_once_where_it_is_named(tmp_path: Path, pla
         assert finding.mark is not None and finding.mark.file.stem == (
             "world" if place in ("world", "camera") else "model"
         )
+
+
+@pytest.mark.parametrize("shape", [{}, {"collision shape": "SPHERE", "collision geometry": {"radius": 1}}])
+def test_what_is_wrong_in_a_mesh_that_is_only_drawn_is_reported(tmp_path: Path, shape: dict[str, object]) -> None:
+    body = {"name": "a", "mass": 1, "mesh": "a.obj", "collision mesh": "", **shape}
+    (tmp_path / "m.yaml").write_text(yaml.safe_dump({"namespace": "/t/", "bodies": ["A"], "A": body}))
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd wood.png\n")
+    (tmp_path / "a.obj").write_text(TRIANGLE)
+    words = "\n".join(map(str, findings(tmp_path / "m.yaml", [], False)))
+    assert "m.mtl:2:1: warning: texture 'wood.png' does not exist" in words
+    (tmp_path / "a.obj").write_text(TRIANGLE.replace("f 1 2 3", "f 1 2 33"))
+    words = "\n".join(map(str, findings(tmp_path / "m.yaml", [], False)))
+    assert "a.obj:7:1: warning: a face names vertex 33, but 4 are defined so far" in words
+
+
+def test_a_volume_alone_is_checked_and_runs_alone(tmp_path: Path) -> None:
+    images = {"path": "./", "prefix": "slice", "format": "png", "count": 2}
+    (tmp_path / "m.yaml").write_text(yaml.safe_dump({"volumes": ["V"], "V": {"name": "v", "images": images}}))
+    assert "has no file slice0.png or such" in errors(findings(tmp_path / "m.yaml", [], False))[0]
+    for number in range(3):
+        Image.new("L", (4, 4), 255).save(tmp_path / f"slice{number}.png")
+    found = findings(tmp_path / "m.yaml", [], False)
+    assert errors(found) == [] and not any("runs only together" in d.message for d in found)
+
+
+def test_pictures_of_the_sky_that_are_missing_are_reported(tmp_path: Path) -> None:
+    faces = ("right", "left", "top", "bottom", "front", "back")
+    world = {"lights": [], "skybox": {"path": "sky", **{face: f"{face}.png" for face in faces}}}
+    (tmp_path / "w.yaml").write_text(yaml.safe_dump(world))
+    (tmp_path / "m.yaml").write_text("bodies: [BODY a]\nBODY a: {name: a, mass: 1}\n")
+    launch = "world config: w.yaml\ninput devices config: d.yaml\ncolor config: c.yaml\nmultibody configs: [m.yaml]\n"
+    (tmp_path / "launch.yaml").write_text(launch)
+    (tmp_path / "sky").mkdir()
+    for face in faces[:3]:
+        (tmp_path / "sky" / f"{face}.png").touch()
+    found = [d.message for d in findings(tmp_path / "launch.yaml", [], False) if d.message.startswith("sky box")]
+    assert found == [f"sky box: the picture '{face}.png' of its {face} does not exist" for face in faces[3:]]

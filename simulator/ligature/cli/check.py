@@ -9,9 +9,11 @@ from pathlib import Path
 from rich.console import Console
 
 import ligature
-from ligature.adf import AdfError, Diagnostic, Document, ResolutionError, Resolver, Severity, read_any
+from ligature.adf import AdfError, Diagnostic, Document, Mark, ResolutionError, Resolver, Severity, read_any
+from ligature.adf.lacking import lack_of
 from ligature.bundle import meant
 from ligature.cli.numbers import counted
+from ligature.mesh import load_mesh
 from ligature.model import reach
 from ligature.model.scene import Scene
 from ligature.physics import inertias, overlaps, springs
@@ -61,7 +63,10 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
         scene = ligature.load(file, models, roots=roots)
     except ligature.SceneError as error:
         return list(error.diagnostics)
-    later = [*reach.findings(scene), *inertias.findings(scene), *_at_start(scene), *_shaders(scene, resolver)]
+    later = [
+        *reach.findings(scene), *inertias.findings(scene), *_at_start(scene), *_shaders(scene, resolver),
+        *_looks(scene, resolver),
+    ]  # fmt: skip
     return _distinct([*document.diagnostics, *scene.diagnostics, *later])
 
 
@@ -81,6 +86,27 @@ def _shaders(scene: Scene, resolver: Resolver) -> list[Diagnostic]:
     return found
 
 
+def _looks(scene: Scene, resolver: Resolver) -> list[Diagnostic]:
+    """What is wrong in mesh files that are drawn, and pictures that are missing: their textures, those of the sky."""
+    found: list[Diagnostic] = []
+    for face, picture in (scene.world.skybox or {}).items():
+        lack = lack_of(picture)
+        if lack is not None:
+            message = f"sky box: the picture '{picture.name}' of its {face} {lack.fault}"
+            found.append(Diagnostic(Severity.WARNING, message, Mark(picture, 1, 1), lack.hint, "render"))
+    visuals = [*(body.visual for body in scene.bodies), *(ghost.visual for ghost in scene.ghosts)]
+    for path in dict.fromkeys(visual.mesh for visual in visuals if visual.visible):
+        if path is None:
+            continue
+        try:
+            found += [d for d in load_mesh(path, resolver).diagnostics if d.severity > Severity.DEBUG]
+        except AdfError as error:
+            hints = (error.diagnostics[0].hint, "what has this mesh is drawn without it; AMBF leaves it out")
+            hint = "; ".join(filter(None, hints))
+            found += [replace(d, severity=Severity.WARNING, hint=hint) for d in error.diagnostics]
+    return found
+
+
 def _at_start(scene: Scene) -> list[Diagnostic]:
     """Findings of the bodies as they start in the physics."""
     engine = Engine(scene, 1e-3)
@@ -92,7 +118,7 @@ def _at_start(scene: Scene) -> list[Diagnostic]:
 
 def _has_bodies(document: Document) -> bool:
     """Whether a model file can stand alone; others hang on bodies of earlier files."""
-    return any(document.elements(name) for name in ("bodies", "soft bodies", "sutures"))
+    return any(document.elements(name) for name in ("bodies", "soft bodies", "volumes", "sutures"))
 
 
 def _distinct(found: Sequence[Diagnostic]) -> list[Diagnostic]:
