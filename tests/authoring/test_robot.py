@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import ligature
 import numpy as np
 import pybullet
 import pytest
@@ -233,6 +235,46 @@ def test_joints_that_start_away_from_zero_are_written_at_zero(tmp_path: Path) ->
     near(robot.links[1].T, frame(np.eye(3), (1.0, 0.0, 0.0)))
     near(robot.joints[0].T[:3, 3], np.zeros(3))
     assert (robot.joints[0].lower, robot.joints[0].upper) == (-1.0, 2.0)
+
+
+@settings(max_examples=25)
+@given(SEEDS)
+def test_links_without_mass_hold_no_robot_still(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
+    """Frames such as ``tool0`` have none: as static bodies they would fix all that carries them."""
+    folder = tmp_path_factory.mktemp("robot")
+    robot = random_robot(seed)
+    rng = np.random.default_rng(seed)
+    links = tuple(
+        replace(link, solid=None if rng.random() < 0.5 else link.solid, visuals=looks, collisions=looks)
+        for link, looks in ((link, link.visuals if rng.random() < 0.5 else ()) for link in robot.links)
+    )
+    (folder / "robot.urdf").write_text(urdf_text(replace(robot, links=links))[0])
+    read = read_urdf(folder / "robot.urdf")
+    done = to_adf(read, folder)
+    bodies = {body.text("name"): body for body in as_model(read, folder).elements("bodies")}
+    carried = {joint.child for joint in read.joints}
+    for link in read.links:
+        assert (bodies[link.name].number("mass") > 0.0) == (link.name in carried or link.solid is not None), link.name
+        reported = any(note.startswith(f"link '{link.name}' has no mass") for note in done.notes)
+        assert reported == (link.solid is None)
+    scene = ligature.load(folder / "robot.yaml")
+    assert not scene.loops and len(scene.articulations) == len(read.links) - len(carried)
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"),
+    [
+        ('lower="-1"', (-1.0, 0.0)), ('upper="2"', (0.0, 2.0)), ('lower="-1" upper="2"', (-1.0, 2.0)),
+        ("", (None, None)),
+    ],
+)  # fmt: skip
+def test_a_limit_that_urdf_leaves_out_is_zero(tmp_path: Path, limit: str, expected: tuple[float | None, ...]) -> None:
+    (tmp_path / "r.urdf").write_text(
+        f'<robot name="r">{LINKS}<joint name="j" type="revolute"><parent link="a"/><child link="b"/>'
+        f'<limit {limit} effort="1" velocity="1"/></joint></robot>'
+    )
+    (joint,) = read_urdf(tmp_path / "r.urdf").joints
+    assert (joint.lower, joint.upper) == expected
 
 
 LINKS = '<link name="a"/><link name="b"/>'

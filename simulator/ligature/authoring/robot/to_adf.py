@@ -27,13 +27,20 @@ _KINDS = {
     "revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed", "ball": "p2p",
 }  # fmt: skip
 
+DEFAULT_MASS = 1.0
+"""Mass in kg of a body whose file gives none, as in the format."""
+
+FRAME_MASS, FRAME_INERTIA = 1e-3, 4e-8
+"""Mass in kg and moments in kg m² of a link that is only a frame: those of a ball of 1 cm radius."""
+
 
 def to_adf(robot: Robot, folder: Path) -> Converted:
     """Bodies and joints of a robot; mesh files are looked up from ``folder``."""
     notes = list(robot.notes)
     meshes: dict[str, Mesh] = {}
     fixed = {joint.child for joint in robot.joints if not joint.parent and joint.kind == "fixed"}
-    items = [_body(link, link.name in fixed, folder, meshes, notes) for link in robot.links]
+    carried = {joint.child for joint in robot.joints if joint.parent and joint.kind in _KINDS} - fixed
+    items = [_body(link, link.name in fixed, link.name in carried, folder, meshes, notes) for link in robot.links]
     poses = {link.name: _rigid(link.T) for link in robot.links}
     inertial = {
         link.name: matrix_of(item.values.get("inertial offset")) for link, item in zip(robot.links, items, strict=True)
@@ -48,9 +55,11 @@ def to_adf(robot: Robot, folder: Path) -> Converted:
     return Converted(Parts(tuple(items), meshes), notes)
 
 
-def _body(link: Link, fixed: bool, folder: Path, meshes: dict[str, Mesh], notes: list[str]) -> Item:
+def _body(link: Link, fixed: bool, carried: bool, folder: Path, meshes: dict[str, Mesh], notes: list[str]) -> Item:
     values: dict[str, Any] = {"name": link.name, "location": pose_of(_rigid(link.T))}
-    if link.solid is None or fixed:
+    if link.solid is None and carried:
+        values.update(_light(link, notes))
+    elif link.solid is None or fixed:
         values["mass"] = 0.0
         if not fixed:
             notes.append(f"link '{link.name}' has no mass, so its body is static")
@@ -65,6 +74,17 @@ def _body(link: Link, fixed: bool, folder: Path, meshes: dict[str, Mesh], notes:
     values.update(_shapes(link.name, link.visuals, "", folder, meshes, notes))
     values.update(_shapes(link.name, link.collisions, "collision ", folder, meshes, notes))
     return Item("body", f"BODY {link.name}", values)
+
+
+def _light(link: Link, notes: list[str]) -> dict[str, Any]:
+    """Keys of the mass of a link that has none and that a joint carries: static, it would hold the whole robot.
+
+    With a shape it gets the format's default mass; the others are frames such as that of a tool.
+    """
+    mass = DEFAULT_MASS if link.visuals or link.collisions else FRAME_MASS
+    notes.append(f"link '{link.name}' has no mass; its body gets {mass:g} kg, since one of 0 kg would be static")
+    moment = {} if mass == DEFAULT_MASS else dict.fromkeys(("inertia.ix", "inertia.iy", "inertia.iz"), FRAME_INERTIA)
+    return {"mass": mass, **moment}
 
 
 def _shapes(

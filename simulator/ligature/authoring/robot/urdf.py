@@ -168,7 +168,8 @@ def _joint(element: Element, T: dict[str, Array]) -> Joint:
     )
     axis, limit, mimic = element.find("axis"), element.find("limit"), element.find("mimic")
     lower = upper = None
-    if limit is not None and element.get("type") in ("revolute", "prismatic") and limit.get("upper") is not None:
+    given = limit is not None and not {"lower", "upper"}.isdisjoint(limit.keys())
+    if limit is not None and given and element.get("type") in ("revolute", "prismatic"):
         lower, upper = (numbers(limit, limit.get(name, "0"), 1, name)[0] for name in ("lower", "upper"))
     return Joint(
         element.get("name") or f"{parent}-{child}",
