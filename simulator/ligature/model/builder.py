@@ -23,7 +23,7 @@ from ligature.model.joints import fixed_joint, joint_of
 from ligature.model.lookup import candidates
 from ligature.model.lost import LostBodies
 from ligature.model.mounted import actuator_of
-from ligature.model.naming import Names, merged
+from ligature.model.naming import Names, free_suffix, merged
 from ligature.model.parenting import Arrivals
 from ligature.model.scene import (
     Actuator,
@@ -84,6 +84,10 @@ class SceneBuilder:
         self.no_rod: set[int] = set()
         self._names = {kind: Names() for kind in (*KINDS, "suture")}
         self._scales: list[float] = []
+        self._in_file: dict[int, str] = {}
+        """Identifiers of bodies within their file: without the suffix that they have where it is loaded twice."""
+        self._earlier: dict[str, frozenset[str]] = {}
+        """Identifiers of each kind in the files before this one."""
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a finding."""
@@ -104,6 +108,7 @@ class SceneBuilder:
         top = document.top
         model = Model(len(self.models), document.path, top.text("namespace"))
         self.models.append(model)
+        self._earlier = {kind: frozenset(names.identifiers) for kind, names in self._names.items()}
         self._note_unusable(document, model)
         local = self._add_bodies(parts, model)
         if not top.flag("ligature rod"):
@@ -148,11 +153,17 @@ class SceneBuilder:
     def _identity(self, kind: str, element: Element, model: Model) -> Identity:
         return self._names[kind].identity(element, model.namespace, model.index)
 
+    def _remap(self, kind: str, element: Element, model: Model) -> str:
+        """The suffix of an object of whose name an earlier file has one, as where a file is loaded twice."""
+        base = merged(model.namespace, element.text("namespace")) + element.key
+        return free_suffix(base, self._earlier[kind])
+
     def _wait(self, kind: str, identity: Identity, index: int) -> None:
         self.arrivals.wait(kind, index, identity.identifier, identity.parent_text, identity.mark)
 
     def _add_bodies(self, parts: ModelParts, model: Model) -> list[int]:
         local = []
+        taken: set[str] = set()
         for part in parts.bodies:
             element, identity = part.element, self._identity("body", part.element, model)
             self.diagnostics += part.findings
@@ -162,6 +173,9 @@ class SceneBuilder:
                 continue
             body = part.make(index=len(self.bodies), identity=identity)
             self.bodies.append(body)
+            base = identity.namespace + identity.key
+            self._in_file[body.index] = base + free_suffix(base, taken)
+            taken.add(self._in_file[body.index])
             self._scales.append(element.number("scale"))
             self.groups.append(self._valid_groups(element))
             if not element.flag("ligature rod"):
@@ -265,7 +279,7 @@ class SceneBuilder:
     def _add_sensors(self, parts: ModelParts, model: Model, local: list[int]) -> None:
         for part in parts.sensors:
             element = part.element
-            parent = self._body(element, "parent", local, "")
+            parent = self._body(element, "parent", local, "", self._remap("sensor", element, model))
             if parent is None:
                 continue
             self.diagnostics += part.findings
@@ -285,7 +299,7 @@ class SceneBuilder:
 
     def _add_actuators(self, document: Document, model: Model, local: list[int]) -> None:
         for element in document.elements("actuators"):
-            parent = self._body(element, "parent", local, "")
+            parent = self._body(element, "parent", local, "", self._remap("actuator", element, model))
             if parent is not None:
                 identity = self._identity("actuator", element, model)
                 self.actuators.append(actuator_of(element, len(self.actuators), identity, self.bodies[parent]))
@@ -293,8 +307,9 @@ class SceneBuilder:
     def _add_joints(self, document: Document, model: Model, local: list[int]) -> None:
         for element in document.elements("joints"):
             space = merged(model.namespace, element.text("namespace"))
-            parent = self._body(element, "parent", local, space)
-            child = self._body(element, "child", local, space)
+            remap = self._remap("joint", element, model)
+            parent = self._body(element, "parent", local, space, remap)
+            child = self._body(element, "child", local, space, remap)
             if parent is None or child is None:
                 continue
             if parent == child:
@@ -345,24 +360,22 @@ class SceneBuilder:
                 self._names["joint"].identifiers.append(identity.identifier)
                 self.linked.append((parent, child))
 
-    def _body(self, element: Element, key: str, local: list[int], namespace: str) -> int | None:
-        """The body that ``element`` names under ``key``, looked for in AMBF's order."""
+    def _body(self, element: Element, key: str, local: list[int], namespace: str, remap: str = "") -> int | None:
+        """The body that ``element`` names under ``key``, looked for in AMBF's order.
+
+        ``remap`` is the element's own suffix; of bodies that earlier files have several times, it means that with it.
+        """
         text = element.text(key)
         names = [body.identity.identifier for body in self.bodies]
-        local_names = [names[i] for i in local]
-        searches = [
-            (local_names, text),
-            (local_names, namespace + text),
-            (names, namespace + text),
-            (names, text),
-        ]
-        if not namespace:
-            searches = [(local_names, text), (names, text)]
+        local_names = [self._in_file.get(i, names[i]) for i in local]
+        in_file = [(True, text), (True, namespace + text)]
+        searches = dict.fromkeys([*in_file, (False, namespace + text + remap), (False, text)])
         ambiguous: list[str] = []
-        for pool, wanted in searches:
+        for within, wanted in searches:
+            pool = local_names if within else names
             found = candidates(pool, wanted) if wanted else []
             if len(found) == 1:
-                return local[found[0]] if pool is local_names else found[0]
+                return local[found[0]] if within else found[0]
             ambiguous += [pool[i] for i in found]
         if not ambiguous and self.lost.took_along(f"{element.kind} '{element.key}'", (text, namespace + text)):
             return None

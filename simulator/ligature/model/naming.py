@@ -6,8 +6,9 @@ when every reference is settled, so that it cannot change what a text means.
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -16,12 +17,16 @@ from ligature.adf.references import merged
 from ligature.model.scene import Identity, Scene
 
 _SLASHES = re.compile(r"/+")
-MAX_REMAP = 100
 
 
 def topic_name(namespace: str, name: str) -> str:
     """Absolute ROS name of an object, without repeated slashes."""
     return _SLASHES.sub("/", f"/{namespace}/{name}")
+
+
+def free_suffix(base: str, taken: Container[str]) -> str:
+    """What makes a new identifier of ``base``: nothing, or the first of 1, 2 and so on that gives one not ``taken``."""
+    return next(s for s in itertools.chain(("",), map(str, itertools.count(1))) if base + s not in taken)
 
 
 class Names:
@@ -34,8 +39,7 @@ class Names:
         """The identity of ``element`` in a file with ``namespace``; it is registered as taken."""
         space = merged(namespace, element.text("namespace"))
         base = space + element.key
-        taken = set(self.identifiers)
-        suffix = next(s for s in ("", *map(str, range(1, MAX_REMAP + 1)), "?") if base + s not in taken)
+        suffix = free_suffix(base, set(self.identifiers))
         self.identifiers.append(base + suffix)
         name = element.text("name").replace(" ", "")
         parent = element.text("parent") if element.kind != "suture" else ""
@@ -82,4 +86,4 @@ def _prefixed(identity: Identity, prefix: str) -> Identity:
     return replace(identity, identifier=prefix + identity.identifier, topic=topic)
 
 
-__all__ = ["Names", "merged", "prefixed", "topic_name"]
+__all__ = ["Names", "free_suffix", "merged", "prefixed", "topic_name"]
