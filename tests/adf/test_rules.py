@@ -142,3 +142,39 @@ def test_a_listed_object_under_a_slightly_different_name_is_suggested(tmp_path: 
 def test_what_is_at_the_edge_of_a_rule_is_no_finding(tmp_path: Path, text: str) -> None:
     found = findings(tmp_path, text, Severity.WARNING)
     assert "negative" not in found and "without limits" not in found
+
+
+BODY = "bodies: [X]\nX:\n  name: x\n  mass: 1\n  {line}\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("color rgba: {r: 255, g: 0, b: 0, a: 1}", "body 'X' has 255 as 'color rgba.r'; colours are 0 to 1"),
+        ("color components: {diffuse: {r: 0, g: -1, b: 0}, transparency: 1}", "has -1 as 'color components.diffuse.g'"),
+        ("parent: BODY other", "has the parent 'BODY other', which only AMBF since October 2024 follows"),
+        ("collision groups: 3", "'collision groups' of body 'X' is one value; a list was expected; write [3]"),
+    ],
+)
+def test_values_of_a_body_that_mislead_are_reported(tmp_path: Path, line: str, words: str) -> None:
+    assert words in findings(tmp_path, BODY.format(line=line), Severity.WARNING)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["color rgba: {r: 1, g: 0, b: 0.5, a: 1}", "parent: ''", "parent:", "collision groups: []", "collision groups:"],
+)
+def test_values_of_a_body_that_do_not_are_not(tmp_path: Path, line: str) -> None:
+    assert findings(tmp_path, BODY.format(line=line), Severity.WARNING) == ""
+
+
+@pytest.mark.parametrize(
+    ("word", "on"),
+    [("0", False), ("1", True), ("5", True), ("[]", True), ("", True)]
+    + [(form, word in ("true", "yes", "on", "y")) for word in ("true", "yes", "on", "y", "false", "no", "off", "n")
+       for form in (word, word.upper(), word.capitalize(), f"'{word}'")],
+)  # fmt: skip
+def test_a_motor_is_off_by_every_word_for_it(tmp_path: Path, word: str, on: bool) -> None:
+    bodies = "bodies: [A, B]\nA: {name: a, mass: 0}\nB: {name: b, mass: 1}\n"
+    (tmp_path / "m.yaml").write_text(bodies + JOINT.format(type="revolute", keys=f"  enable motor: {word}\n"))
+    assert ligature.load(tmp_path / "m.yaml").joints[0].motor_enabled is on

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import ligature
 import numpy as np
 import pytest
 from ligature.adf import Severity
+from ligature.adf.schema import MOST_RAYS
 from ligature.model.scene import JointType, Scene
 
 LAUNCH = "world config: world.yaml\ncolor config: c.yaml\ninput devices config: d.yaml\nmultibody configs: [{models}]\n"
@@ -249,3 +251,27 @@ def test_a_fixed_joint_ignores_limits_but_not_offsets(lab) -> None:
     found = lab(m=bodies("a", "b") + joint).joints[0]
     assert found.type is JointType.FIXED and found.low is None
     assert np.allclose(found.T_parent_child_zero[:2, :2], [[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]])
+
+
+RAYS = {
+    "parametric": (
+        "{resolution: {count}, horizontal angle: 1, vertical angle: 1, start offset: 0}",
+        "at most 256, not 257",
+    ),
+    "mesh": ("rays.stl", "'mesh' of sensor 'S' gives 65537 rays; at most 65536 are cast"),
+}
+
+
+@pytest.mark.parametrize("source", RAYS)
+@pytest.mark.parametrize("beyond", [0, 1])
+def test_a_sensor_has_only_so_many_rays(lab, tmp_path: Path, source: str, beyond: int) -> None:
+    """Each is cast in every tick; a resolution of 100 000 would be 10 000 million."""
+    value, words = RAYS[source]
+    triangle = struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
+    (tmp_path / "rays.stl").write_bytes(
+        bytes(80) + struct.pack("<I", MOST_RAYS + beyond) + triangle * (MOST_RAYS + beyond)
+    )
+    text = bodies("a") + "sensors: [S]\nS: {name: s, type: Proximity, parent: BODY a, " + f"{source}: {value}}}\n"
+    scene = lab(m=text.replace("{count}", str(256 + beyond)))
+    assert [len(sensor.rays) for sensor in scene.sensors] == ([] if beyond else [MOST_RAYS])
+    assert (words in reported(scene, Severity.ERROR)) == bool(beyond), reported(scene)

@@ -93,6 +93,24 @@ def _is_compiled(entry: Node) -> bool:
     return isinstance(file, Scalar) and file.text.endswith(LIBRARIES)
 
 
+def colours(element: Element) -> Iterator[Diagnostic]:
+    """Components of colours are 0 to 1; those of old colour files were 0 to 255."""
+    paths = [f"color rgba.{c}" for c in "rgba"]
+    paths += [f"color components.{part}.{c}" for part in ("diffuse", "specular", "emission") for c in "rgb"]
+    beyond = [path for path in paths if element.has(path) and not 0.0 <= element.number(path) <= 1.0]
+    if beyond:
+        message = f"has {element.number(beyond[0]):g} as '{beyond[0]}'"
+        yield _finding(element, Severity.WARNING, beyond[0], message, "colours are 0 to 1; divide those of 255 by 255")
+
+
+def followed(element: Element) -> Iterator[Diagnostic]:
+    """AMBF of October 2024 and later places bodies in the frame of a parent; files for it would fall apart."""
+    if element.text("parent"):
+        message = f"has the parent '{element.text('parent')}', which only AMBF since October 2024 follows"
+        hint = "its location is read in the world frame; join it by a fixed joint"
+        yield _finding(element, Severity.WARNING, "parent", message, hint)
+
+
 def shapes(element: Element) -> Iterator[Diagnostic]:
     """A primitive needs the dimensions of its kind."""
     for shape, geometry in (("shape", "geometry"), ("collision shape", "collision geometry")):
@@ -123,6 +141,11 @@ def joint_limits(element: Element) -> Iterator[Diagnostic]:
     if kind in _LIMITED and has_low != has_high:
         message = f"has only '{'low' if has_low else 'high'}' of its limits, so it is unlimited"
         yield _finding(element, Severity.WARNING, "joint limits", message, "set low and high")
+    if kind in _LIMITED and has_low and has_high:
+        low, high = element.number("joint limits.low"), element.number("joint limits.high")
+        if low > high:
+            message = f"has the limits {low:g} to {high:g}, so it is unlimited"
+            yield _finding(element, Severity.WARNING, "joint limits", message, "set low to at most high")
     if kind in _SPRINGS and not (has_low and has_high):
         hint = "set joint limits: {low, high}"
         yield _finding(element, Severity.WARNING, "type", f"is a {kind} without limits, which locks it", hint)
@@ -236,16 +259,16 @@ RULES: dict[str, tuple[Rule, ...]] = {
     "world": (namespaces, world_surroundings, plugins, version),
     "model": (namespaces, plugins, version),
     "input devices": (version,),
-    "body": (*_COMMON, shapes),
+    "body": (*_COMMON, shapes, colours, followed),
     "joint": (plugins, joint_limits, joint_springs, joint_without_effect),
-    "ghost object": (*_COMMON, shapes),
+    "ghost object": (*_COMMON, shapes, colours),
     "sensor": (*_COMMON, sensor_rays),
     "actuator": _COMMON,
     "camera": (*_COMMON, camera_view),
     "light": _COMMON,
-    "soft body": (namespaces, plugins, shapes),
+    "soft body": (namespaces, plugins, shapes, colours),
     "vehicle": (*_COMMON, wheels),
-    "volume": (namespaces, plugins),
+    "volume": (namespaces, plugins, colours),
     "input device": (device_target,),
 }
 """Rules of each kind of file and object."""

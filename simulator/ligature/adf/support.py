@@ -30,7 +30,8 @@ Ligature deviates from AMBF only where AMBF has a defect on which no file relies
 - a joint without `type` is revolute, with a warning;
 - `enable motor` alone is accepted;
 - objects of the same name get separate topics;
-- a missing low-resolution mesh is replaced by the high-resolution one, with a warning.
+- a missing low-resolution mesh is replaced by the high-resolution one, with a warning;
+- a collision margin of at least half the thickness of a box or cylinder, through which spheres would fall, is reduced.
 
 This page is generated from the schema by `make docs`.
 """

@@ -29,7 +29,7 @@ def axes_of(joint: Joint) -> tuple[Axis, ...] | None:
     if joint.type is JointType.FIXED:
         return ()
     if joint.type in (JointType.LINEAR_SPRING, JointType.TORSION_SPRING):
-        if joint.low is None:
+        if joint.low is None and not joint.freed:
             return ()
         linear = joint.type is JointType.LINEAR_SPRING
         return (Axis(linear, z, joint.low, joint.high, joint.stiffness, joint.damping, joint.equilibrium),)

@@ -240,7 +240,7 @@ def _settings(world: Document | None, shaders: ShaderFiles | None, extra: dict[s
     top = world.top
     namespace = top.text("namespace")
     skybox = None
-    if top.has("skybox") and all(top.has(f"skybox.{face}") for face in SKYBOX_FACES):
+    if top.has("skybox") and all(top.text(f"skybox.{face}") for face in SKYBOX_FACES):
         folder = world.path.parent / top.text("skybox.path")
         skybox = {face: folder / top.text(f"skybox.{face}") for face in SKYBOX_FACES}
     return WorldSettings(

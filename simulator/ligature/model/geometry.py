@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ligature.adf import Diagnostic, Element, Resolver, Severity
-from ligature.adf.diagnostics import AdfError
+from ligature.adf.diagnostics import AdfError, length
 from ligature.adf.lacking import lack_of
 from ligature.mesh import ConvexPart, collision_parts, load_mesh
 from ligature.mesh.load import EXTENSIONS
@@ -81,6 +81,26 @@ def colliders(element: Element, context: FileContext, default_offset: Array) -> 
     if not name:
         return ()
     return _mesh_colliders(element, name, context)
+
+
+def collision_margin(element: Element, shapes: tuple[Collider, ...], report: Report) -> float:
+    """The collision margin, in metres, of an element with ``shapes``.
+
+    It lies within boxes and cylinders, so that one of at least half their thickness turns them inside out for Bullet:
+    spheres fall through them. Half of that is taken then.
+    """
+    margin = element.number("collision margin")
+    inner = [part.shape for part in shapes if isinstance(part.shape, Box | Cylinder)]
+    halves = [min(shape.size) / 2 if isinstance(shape, Box) else min(shape.radius, shape.height / 2) for shape in inner]
+    if not halves or margin < min(halves):
+        return margin
+    least = float(min(halves))
+    what = f"has a collision margin of {length(margin)} in a shape {length(2 * least)} thick"
+    severity = Severity.WARNING if element.has("collision margin") else Severity.INFO
+    hint = f"{length(least / 2)} is taken; give less than half the thickness"
+    message = f"{element.kind} '{element.key}' {what}"
+    report(Diagnostic(severity, message, element.mark_of("collision margin"), hint, "geometry"))
+    return least / 2
 
 
 def visual(element: Element, context: FileContext, shaders: ShaderFiles | None) -> Visual:
@@ -158,10 +178,10 @@ def primitive(element: Element, shape_key: str, geometry: str, T: Array) -> Coll
         if not element.has(f"{geometry}.normal"):
             raise _error(element, geometry, "a PLANE needs 'normal'", "add normal: {x, y, z}")
         normal = np.array(element.vector(f"{geometry}.normal"))
-        length = float(np.linalg.norm(normal))
-        if length == 0.0:
+        norm = float(np.linalg.norm(normal))
+        if norm == 0.0:
             raise _error(element, geometry, "the normal of the plane is zero", "set a direction of non-zero length")
-        return Collider(Plane(normal / length, (element.value(f"{geometry}.offset") or 0.0) / length), T)
+        return Collider(Plane(normal / norm, (element.value(f"{geometry}.offset") or 0.0) / norm), T)
     round_shapes: dict[str, type[Cylinder] | type[Capsule] | type[Cone]]
     round_shapes = {"CYLINDER": Cylinder, "CAPSULE": Capsule, "CONE": Cone}
     turned = T @ frame(_AXIS[element.text(f"{geometry}.axis")], (0, 0, 0))

@@ -6,10 +6,11 @@ Frames and units as in `ligature.model.scene`.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from ligature.adf import Element
+from ligature.adf import Element, scalars
 from ligature.model.frames import Array, inverse, joint_frames
 from ligature.model.scene import Body, Gains, Identity, Joint, JointType, OutputType, SixDof
 
@@ -36,9 +37,10 @@ def joint_of(
     T_zero = parent.T_body_inertial @ frames.T_parent_child @ np.linalg.inv(child.T_body_inertial)
     low, high = _limits(element, kind)
     springs = kind in (JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
+    span = _span(element) if springs else None
     equilibrium = _scalar(element, "equilibrium point") if springs else None
     if equilibrium is None:
-        equilibrium = 0.0 if low is None or high is None else (low + high) / 2
+        equilibrium = 0.0 if span is None else sum(span) / 2
     output = element.value("controller output type")
     default_output = "FORCE" if element.has("controller") else "VELOCITY"
     return Joint(
@@ -53,6 +55,7 @@ def joint_of(
         T_parent_child_zero=T_zero,
         low=low,
         high=high,
+        freed=span is not None and low is None,
         controller=Gains(*(element.number(f"controller.{k}") for k in "PID")),
         output=OutputType[output or default_output],
         max_motor_impulse=element.number("max motor impulse"),
@@ -63,19 +66,31 @@ def joint_of(
         equilibrium=equilibrium,
         six_dof=_six_dof(element, kind),
         cone_twist=_cone_twist(element, kind),
-        motor_enabled=element.raw_value("enable motor") not in ("0", "false", "False", "no", "off"),
+        motor_enabled=_motor(element.raw_value("enable motor")),
         feedback=element.flag("enable feedback"),
         passive=element.flag("passive"),
     )
 
 
-def _limits(element: Element, kind: JointType) -> tuple[float | None, float | None]:
-    """Both limits or none; a fixed joint has none, a revolute one with low > high neither."""
+def _motor(value: Any) -> bool:
+    """What ``enable motor`` means: old files give 0 or 1, others a truth value; anything else counts as true."""
+    try:
+        return not isinstance(value, str) or (value != "0" and scalars.flag(value))
+    except ValueError:
+        return True
+
+
+def _span(element: Element) -> tuple[float, float] | None:
+    """The ends of the limits as the file gives them; None unless it gives both."""
     low, high = element.value("joint limits.low"), element.value("joint limits.high")
+    return None if low is None or high is None else (float(low), float(high))
+
+
+def _limits(element: Element, kind: JointType) -> tuple[float | None, float | None]:
+    """Both limits or none; a fixed joint has none, one with low > high neither, as in Bullet."""
+    span = _span(element)
     limited = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
-    if low is None or high is None or kind not in limited or low > high:
-        return None, None
-    return float(low), float(high)
+    return (None, None) if span is None or kind not in limited or span[0] > span[1] else span
 
 
 def _scalar(element: Element, path: str) -> float | None:

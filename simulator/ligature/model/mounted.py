@@ -14,11 +14,18 @@ import numpy as np
 from ligature.adf import Diagnostic, Element, Resolver, Severity
 from ligature.adf.diagnostics import AdfError
 from ligature.adf.lacking import lack_of
-from ligature.adf.schema import CLIPPING
+from ligature.adf.schema import CLIPPING, MOST_RAYS
 from ligature.adf.schema.keys import FARTHEST
 from ligature.mesh import load_mesh
 from ligature.model.frames import Array, axis_rotation, frame, pose_matrix
-from ligature.model.geometry import FileContext, GeometryError, colliders, shader_files, visual
+from ligature.model.geometry import (
+    FileContext,
+    GeometryError,
+    colliders,
+    collision_margin,
+    shader_files,
+    visual,
+)
 from ligature.model.piercing import Tissue
 from ligature.model.scene import Actuator, Attachment, Body, Camera, Ghost, Identity, Light, SensorType, Slip
 
@@ -39,7 +46,7 @@ def ghost_of(element: Element, context: FileContext) -> Callable[..., Ghost]:
         colliders=shapes,
         visual=visual(element, context, None),
         collision_groups=tuple(int(g) for g in element.numbers("collision groups")),
-        collision_margin=element.number("collision margin"),
+        collision_margin=collision_margin(element, shapes, context.report),
         hole=element.value("ligature hole"),
         tissue=_tissue(element),
     )
@@ -126,8 +133,19 @@ def camera_of(element: Element, folder: Path) -> Callable[..., Camera]:
 def sensor_rays(element: Element, folder: Path, resolver: Resolver) -> Array:
     """Start and end points (n, 2, 3) of a sensor's rays in its own frame; a contact sensor has none.
 
-    Raises `GeometryError` for a negative range, and for a direction that is not of length 1.
+    Raises `GeometryError` for a negative range, for a direction that is not of length 1, and for too many rays.
     """
+    rays = _rays(element, folder, resolver)
+    if len(rays) > MOST_RAYS:
+        source = next(name for name in ("array", "mesh", "parametric") if element.has(name))
+        message = f"'{source}' of sensor '{element.key}' gives {len(rays)} rays; at most {MOST_RAYS} are cast"
+        hint = "take a coarser mesh" if source == "mesh" else "list fewer"
+        raise GeometryError(Diagnostic(Severity.ERROR, message, element.mark_of(source), hint, "sensor"))
+    return rays
+
+
+def _rays(element: Element, folder: Path, resolver: Resolver) -> Array:
+    """The rays of a sensor, however many."""
     if SensorType[element.text("type")] is SensorType.CONTACT:
         return np.zeros((0, 2, 3))
     reach = element.number("range")
@@ -187,10 +205,11 @@ def _fan_rays(element: Element, reach: float) -> Array:
     wide, high = element.number("parametric.horizontal angle"), element.number("parametric.vertical angle")
     start = element.number("parametric.start offset")
     rays = []
-    for i in range(n):
-        for j in range(n):
-            h, v = -wide / 2 + i * wide / (n - 1), -high / 2 + j * high / (n - 1)
-            direction = axis_rotation((0, 0, 1), h) @ axis_rotation((0, 1, 0), v) @ np.array([1.0, 0.0, 0.0])
+    turned = [axis_rotation((0, 0, 1), -wide / 2 + i * wide / (n - 1)) for i in range(n)]
+    tilted = [axis_rotation((0, 1, 0), -high / 2 + j * high / (n - 1)) for j in range(n)]
+    for across in turned:
+        for up in tilted:
+            direction = across @ up @ np.array([1.0, 0.0, 0.0])
             rays.append((start * direction, (start + reach) * direction))
     return np.array(rays)
 

@@ -14,7 +14,7 @@ from ligature.adf import Diagnostic, Element, Severity
 from ligature.mesh import box_inertia
 from ligature.model.extents import estimate_size, mesh_centroid
 from ligature.model.frames import Array, frame, pose_matrix
-from ligature.model.geometry import FileContext, colliders, visual
+from ligature.model.geometry import FileContext, colliders, collision_margin, visual
 from ligature.model.scene import (
     Body,
     CartesianController,
@@ -39,7 +39,7 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
     shapes = colliders(element, context, np.eye(4) if offset is None else offset)
     looks = visual(element, context, shaders)
     tissue = tissue_of(element, context, looks, shapes)
-    margin = element.number("collision margin")
+    margin = collision_margin(element, shapes, context.report)
     has_mass = element.has("mass")  # without it, no inertial key has an effect
     offset, moments = (offset, _moments(element)) if has_mass else (None, None)
     if tissue is not None:

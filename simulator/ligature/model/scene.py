@@ -165,7 +165,8 @@ class Joint:
     ``axis`` (3,) is a_A, the unit joint axis in the parent's inertial frame. ``T_parent_a`` is the
     constraint frame A in the parent's inertial frame, ``T_child_b`` frame B in the child's inertial
     frame. ``T_parent_child_zero`` is the child's body frame in the parent's body frame at
-    joint position zero. ``low``/``high`` are None when the joint has no limits.
+    joint position zero. ``low``/``high`` are None when the joint has no limits. Springs without limits are locked,
+    unless ``freed``: the file gives them the wrong way round, which frees the axis (as in Bullet).
     """
 
     index: int
@@ -187,6 +188,7 @@ class Joint:
     stiffness: float = 0.0
     damping: float = 0.0
     equilibrium: float = 0.0
+    freed: bool = False
     six_dof: SixDof | None = None
     cone_twist: tuple[float, float, float] | None = None
     motor_enabled: bool = True

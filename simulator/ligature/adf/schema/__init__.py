@@ -3,7 +3,7 @@
 Reader, checker, writer and the support table in ``docs/adf.md`` are generated from it.
 """
 
-from ligature.adf.schema.attached import ACTUATOR, CAMERA, CLIPPING, LIGHT, SENSOR, VOLUME
+from ligature.adf.schema.attached import ACTUATOR, CAMERA, CLIPPING, LIGHT, MOST_RAYS, SENSOR, VOLUME
 from ligature.adf.schema.blocks import SHAPE_KEYS
 from ligature.adf.schema.bodies import BODY, GHOST, JOINT, SOFT_BODY, SUTURE, VEHICLE
 from ligature.adf.schema.files import DEVICES, INPUT_DEVICE, LAUNCH, LISTS, MODEL, PLURALS, WORLD
@@ -37,6 +37,7 @@ __all__ = [
     "BY_PATH",
     "CLIPPING",
     "LISTS",
+    "MOST_RAYS",
     "NOT_SIMULATED",
     "PLURALS",
     "SCHEMA",

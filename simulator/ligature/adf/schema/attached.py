@@ -16,6 +16,9 @@ RENDERINGS = spellings("mesh", "rays", "transfer function")
 WIDEST = 16384
 """Most pixels along an edge of a picture: the largest texture that OpenGL drivers commonly offer."""
 
+MOST_RAYS = 65536
+"""Most rays of a sensor; each is cast in every tick."""
+
 CLIPPING = (0.1, 1000.0)
 """Nearest and farthest distance in metres of a camera whose own are not 0 < near < far: those that CHAI3D keeps then
 (``cCamera::setClippingPlanes``)."""
@@ -31,7 +34,7 @@ SENSOR = (
     Key("array[].direction", V, doc="not normalised: its length scales the range", required=True),
     Key("mesh", P, doc="without `array`: one ray for each triangle"),
     Key("parametric", MAP, doc="without `array` and `mesh`: a fan of resolution² rays"),
-    Key("parametric.resolution", U, doc="rays along each side, at least 2", required=True),
+    Key("parametric.resolution", U, doc="rays along each side, at least 2", required=True, most=MOST_RAYS**0.5),
     Key("parametric.horizontal angle", N, unit="rad", doc="full angle about z", required=True),
     Key("parametric.vertical angle", N, unit="rad", doc="full angle about y", required=True),
     Key("parametric.start offset", N, unit="m", doc="distance of the starts from S", required=True),

@@ -213,7 +213,7 @@ JOINT = (
     Key("joint limits", MAP, doc="unlimited unless both ends are given"),
     Key("joint limits.low", N, unit="rad, m", doc="lower limit"),
     Key("joint limits.high", N, unit="rad, m", doc="upper limit"),
-    *each("xyz", N, "joint limits.{}", 0.7, "rad", "half angle of a cone twist about frame {}"),
+    *each("xyz", N, "joint limits.{}", 0.7, "rad", "half angle of a cone twist about frame {}", least=0.0),
     *_limits("linear", "m"),
     *_limits("angular", "rad"),
     *gains("controller", "joint PID", required=False),
