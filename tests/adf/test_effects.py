@@ -207,7 +207,7 @@ PAIRS: dict[tuple[str, str], list[Any]] = {
     ],
     ("*", "direction"): [{"x": 0, "y": 0, "z": -1}, {"x": 1, "y": 0, "z": 0}],
     ("*", "array[].direction"): [{"x": 0, "y": 0, "z": -1}, {"x": 1, "y": 0, "z": 0}],
-    ("*", "collision groups"): [[0], [1]], ("*", "pair cameras"): [["one"], ["other"]],
+    ("*", "collision margin"): [0.01, 0.02], ("*", "collision groups"): [[0], [1]], ("*", "pair cameras"): [["one"], ["other"]],
     ("*", "controlling devices"): [["one"], ["other"]],
     ("suture", "USP size"): ["2-0", "5-0"], ("volume", "images.path"): ["./", "./more/"],
     ("volume", "images.prefix"): ["slice", "layer"], ("volume", "images.format"): ["png", "bmp"], ("joint", "enable motor"): [0, 1],
