@@ -63,6 +63,11 @@ def test_a_camera_is_found_by_its_name_though_another_name_contains_it(simulate:
         cameras["cameraX"]
 
 
+def test_a_scene_without_cameras_reports_where_they_are_listed(simulate: Make) -> None:
+    with pytest.raises(KeyError, match="no camera 'C': the scene has none; list one in 'cameras' of a file"):
+        simulate().cameras["C"]
+
+
 def test_a_camera_shows_the_state_as_it_is(simulate: Make) -> None:
     simulation = simulate(C=camera("C"))
     before = seen(simulation, "C", "Bead")

@@ -13,6 +13,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ligature.adf.schema import PLURALS
 from ligature.model.commands import BodyCommand, Command, CommandType, Release
 from ligature.model.frames import matrix_pose7
 from ligature.model.lookup import UnknownNameError, find_by_text
@@ -64,6 +65,10 @@ class Handles(Mapping[str, Handle], Generic[Handle]):
     def _unknown(self, text: str) -> str:
         """Why ``text`` names nothing, and what to choose from: what contains it, what is alike, or all there is."""
         topics = self._names[0]
+        if not topics:
+            return (
+                f"there is no {self._kind} '{text}': the scene has none; list one in '{PLURALS[self._kind]}' of a file"
+            )
         alike = difflib.get_close_matches(str(text), self._bare_names, MOST_NAMES)
         near = [topic for topic in topics if str(text) in topic]
         near = near or [topic for topic, name in zip(topics, self._bare_names, strict=True) if name in alike]
