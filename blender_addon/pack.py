@@ -20,8 +20,8 @@ HERE = Path(__file__).resolve().parent
 SIMULATOR = HERE.parent / "simulator" / "ligature"
 SHARED = ("adf", "mesh", "authoring")
 MODULES = ("cache.py", "paths.py")
-LEFT_OUT = {"mesh/distance.py", "mesh/quality.py", "mesh/coacd_process.py"}
-"""Modules that need numba or SciPy, which Blender does not have."""
+LEFT_OUT = {"mesh/distance.py", "mesh/quality.py", "mesh/decompose.py", "mesh/coacd_process.py"}
+"""Modules that need numba, SciPy or processes of ours, which Blender does not have."""
 
 NAME = "adf_studio"
 WHEELS = {"PyYAML": "6.0.2", "coacd": "1.0.14"}

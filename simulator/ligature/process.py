@@ -22,6 +22,19 @@ _IMPORT_SYSTEM = "<frozen importlib._bootstrap>"
 _PR_SET_PDEATHSIG = 1
 _prctl = ctypes.CDLL(None).prctl
 
+_CALL = (
+    "import sys; sys.path[:1] = filter(None, sys.path[:1]); del sys.argv[0]; "
+    "__import__(sys.argv[0], fromlist=['main']).main()"
+)
+
+
+def program(module: str, *words: str) -> list[str]:
+    """The command by which a new process of this Python calls ``main`` of ``module``, with ``words`` as arguments.
+
+    ``python -m`` would import from the working folder first: there may be a scene of others, with a ``yaml.py``.
+    """
+    return [sys.executable, "-c", _CALL, module, *words]
+
 
 def end_with_parent(parent: int | None = None) -> None:
     """Ask Linux to terminate this process when its parent dies, also by ``kill -9``.

@@ -47,7 +47,7 @@ class Round:
 
 def processor_seconds(served: Served) -> tuple[float, float]:
     """What physics has had, and all processes of the page."""
-    listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
+    listing = subprocess.run(["ps", "-wweo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
     rows = [line.split(None, 2) for line in listing.splitlines()[1:]]
     physics = [pid for pid, ppid, words in rows if int(ppid) == served.process.pid and "ligature.cli.physics" in words]
     page = [pid for pid, ppid, words in rows if int(ppid) == served.process.pid and "cockpit_process" in words]

@@ -31,7 +31,7 @@ CROWDS = (1, 10)
 
 def processes(served: Served) -> dict[str, str]:
     """Process ids of physics, the page, and the drawing of its pictures."""
-    listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
+    listing = subprocess.run(["ps", "-wweo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
     rows = [line.split(None, 2) for line in listing.splitlines()[1:]]
     ours = {words: pid for pid, parent, words in rows if int(parent) == served.process.pid}
     page = next(pid for words, pid in ours.items() if "cockpit_process" in words)

@@ -9,6 +9,8 @@ import xmlrpc.server
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from ligature.cli import master
 
 
@@ -50,10 +52,20 @@ def test_a_taken_port_is_reported(listener: socket.socket) -> None:
     )
 
 
-@pytest.mark.parametrize("uri", ["foo", "http://", "http://localhost:notaport", "http://localhost:99999", "ftp://a:1"])
+@pytest.mark.parametrize("uri", [
+    "foo", "http://", "http://localhost:notaport", "http://localhost:99999", "ftp://a:1", "http://[::1:11311",
+    "http://localhost:0", "http://localhost: 11311", "http://localhost:11311\n",
+])  # fmt: skip
 def test_a_text_that_is_no_address_is_reported(uri: str) -> None:
     assert not master.master_answers(uri)
     assert master.obstacle(uri) == f"ROS_MASTER_URI '{uri}' is not an address; write one such as http://127.0.0.1:11311"
+
+
+@given(st.text("[]/:0@.#?\n\udcff\0", max_size=12))
+def test_whatever_the_address_is_a_master_can_be_started_there_or_not(text: str) -> None:
+    problem = master.obstacle(f"http://{text}")
+    if not problem:
+        assert master.command(f"http://{text}")[-1].isdecimal()
 
 
 def test_a_master_elsewhere_is_not_started_here() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import signal
@@ -15,7 +16,7 @@ from queue import Queue
 import pytest
 from ligature.bus.leftovers import FOLDER
 from ligature.cli.options import RunOptions
-from ligature.cli.supervisor import Child, Event, Supervisor
+from ligature.cli.supervisor import Child, Event, Output, Supervisor
 from rich.console import Console
 
 from tests.conftest import ROOT
@@ -94,6 +95,23 @@ def test_a_master_that_ends_is_reported_with_its_last_line(monkeypatch: pytest.M
     assert (
         f"for http://127.0.0.1:{port} does not answer: its log is somebody else's; start 'roscore'" in text.getvalue()
     )
+
+
+@pytest.mark.usefixtures("handlers")
+@pytest.mark.parametrize("gone", ["full", "closed"])
+def test_a_run_goes_on_when_its_output_cannot_be_written(gone: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A log on a full disk, and a reader such as `head` that has left."""
+    monkeypatch.setenv("ROS_MASTER_URI", "foo")
+    if gone == "full":
+        file = open("/dev/full", "w", encoding="utf-8")  # noqa: SIM115
+    else:
+        reader, pipe = os.pipe()
+        os.close(reader)
+        file = os.fdopen(pipe, "w")
+    console = Console(file=Output(file), soft_wrap=True)  # type: ignore[arg-type]
+    assert Supervisor(RunOptions("none.yaml"), console).run() == 1
+    with contextlib.suppress(OSError):
+        file.close()
 
 
 @pytest.mark.usefixtures("handlers")

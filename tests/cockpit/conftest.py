@@ -222,7 +222,7 @@ class Person:
 
     def processes(self) -> list[int]:
         """Process ids of the browser, its first one first."""
-        listing = subprocess.run(["ps", "-eo", "pid,ppid"], capture_output=True, text=True, check=True).stdout
+        listing = subprocess.run(["ps", "-wweo", "pid,ppid"], capture_output=True, text=True, check=True).stdout
         parents = dict(tuple(map(int, line.split())) for line in listing.splitlines()[1:])  # type: ignore[misc]
         found = [self.driver.service.process.pid]
         for pid in found:

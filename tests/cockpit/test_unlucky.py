@@ -43,7 +43,7 @@ def operator(running: Served) -> Iterator[Wired]:
 
 def children() -> list[list[str]]:
     """All processes: number, parent's number, command."""
-    listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
+    listing = subprocess.run(["ps", "-wweo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
     return [line.split(None, 2) for line in listing.splitlines()[1:]]
 
 
@@ -56,7 +56,9 @@ def physics_process(running: Served) -> int:
 def page_processes(running: Served) -> tuple[int, int]:
     """The page's process, and the one that draws its pictures."""
     rows = children()
-    page = next(int(pid) for pid, parent, words in rows if int(parent) == running.process.pid and "cockpit" in words)
+    page = next(
+        int(pid) for pid, parent, words in rows if int(parent) == running.process.pid and "cockpit_process" in words
+    )
     return page, next(int(pid) for pid, parent, _ in rows if int(parent) == page)
 
 

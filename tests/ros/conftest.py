@@ -82,7 +82,7 @@ class Program:
     def children(self) -> dict[str, int]:
         """Process ids of the simulator's processes by module name."""
         found = {}
-        listing = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
+        listing = subprocess.run(["ps", "-wweo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
         for line in listing.splitlines()[1:]:
             pid, parent, args = line.split(None, 2)
             if int(parent) == self.process.pid:

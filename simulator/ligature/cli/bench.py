@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 import ligature
 from ligature.model.scene import Scene
@@ -41,7 +42,7 @@ def bench(
     if json:
         console.print_json(json_module.dumps(figures))
         return 0
-    table = Table(title=f"{launch} at {figures['dt_ms']:g} ms, updates of {figures['update_ms']:g} ms")
+    table = Table(title=Text(f"{launch} at {figures['dt_ms']:g} ms, updates of {figures['update_ms']:g} ms"))
     table.add_column("figure")
     table.add_column("value", justify="right")
     for name in (

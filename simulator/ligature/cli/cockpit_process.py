@@ -54,7 +54,3 @@ def _on_ros(prefix: str) -> tuple[TopicHealth, TeleopRemote]:
     health = TopicHealth(remote.find_pairs)
     health.start()
     return health, remote
-
-
-if __name__ == "__main__":
-    main()

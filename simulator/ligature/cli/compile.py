@@ -19,7 +19,7 @@ from ligature.cli.numbers import counted
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.model.piercing import Needle
 from ligature.paths import reason
-from ligature.process import end_with_parent
+from ligature.process import end_with_parent, program
 from ligature.robots.arm import Kinematics
 from ligature.robots.ecm import Ecm
 from ligature.robots.mtm import Mtm
@@ -52,7 +52,8 @@ def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
     begin = time.monotonic()
     console.print(
         f"compiling the kernels of {counted(sum(map(len, groups)), 'scene')} in "
-        f"{counted(len(groups), 'process', 'processes')}; this takes 2 to 4 minutes, once"
+        f"{counted(len(groups), 'process', 'processes')}; this takes 2 to 4 minutes, once",
+        markup=False,
     )
     running = {group: _start(group, console) for group in groups}
     status = 0
@@ -62,16 +63,16 @@ def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
             names = ", ".join(map(str, group))
             console.print(f"{names} cannot run (status {process.returncode})", style="red", markup=False)
             status = 1
-    console.print(f"compiled after {time.monotonic() - begin:.0f} s")
+    console.print(f"compiled after {time.monotonic() - begin:.0f} s", markup=False)
     return status
 
 
 def _start(scenes: Sequence[Path], console: Console) -> tuple[subprocess.Popen[str], threading.Thread]:
     """A process that runs ``scenes`` one by one, and the thread that shows what it prints."""
-    command = [sys.executable, "-m", "ligature.cli.compile", *map(str, scenes)]
     process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", preexec_fn=end_with_parent
-    )
+        program("ligature.cli.compile", *map(str, scenes)), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        encoding="utf-8", errors="replace", preexec_fn=end_with_parent,
+    )  # fmt: skip
 
     def show() -> None:
         assert process.stdout is not None
@@ -141,7 +142,8 @@ def _draw(simulation: ligature.Simulation) -> None:
             return
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Entry point of a process that compiles: its arguments are launch files."""
     try:
         for argument in sys.argv[1:]:
             run_for_a_moment(Path(argument))

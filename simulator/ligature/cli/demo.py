@@ -24,13 +24,15 @@ _NAP = 0.05
 """Seconds between two looks at whether the example has ended."""
 
 _LAUNCH = """
+import sys
+sys.path[:1] = filter(None, sys.path[:1])
 import signal
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
 from ligature.cli.demo import play
 play()
 """
-"""Until an example runs, a signal ends its process without a word."""
+"""Until an example runs, a signal ends its process without a word. Nothing comes from the folder that one is in."""
 
 
 def demo(
@@ -46,7 +48,7 @@ def demo(
         console.print("--dataset writes sutures through holes; leave out --tissue, or --dataset")
         return 2
     if not example.is_file():
-        console.print(f"the demonstration '{example}' is missing; install Ligature again")
+        console.print(f"the demonstration '{example}' is missing; install Ligature again", markup=False)
         return 2
     if dataset is None:
         count = [] if tissue else ["--throws", str(throws)]
@@ -87,7 +89,7 @@ def _wait(command: list[str]) -> int:
 def play() -> None:
     """Run the program that the arguments name as Python does; an interrupt ends it without a traceback."""
     del sys.argv[0]
-    sys.path[0] = str(Path(sys.argv[0]).parent)
+    sys.path.insert(0, str(Path(sys.argv[0]).parent))
     signal.signal(signal.SIGINT, signal.default_int_handler)
     take_interrupts()
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import shutil
 import socket
 import xmlrpc.client
@@ -35,15 +36,11 @@ def master_answers(uri: str) -> bool:
 
 def obstacle(uri: str) -> str:
     """Why no master can be started for ``uri``; empty when nothing stands in the way."""
-    where = urlparse(uri)
-    try:
-        port = where.port or DEFAULT_PORT
-    except ValueError:
-        port = 0
-    if where.scheme != "http" or not where.hostname or not port:
+    host, port = _address(uri)
+    if not host or not port:
         return f"ROS_MASTER_URI '{uri}' is not an address; write one such as {DEFAULT_MASTER}"
-    if not _is_here(where.hostname):
-        return f"the ROS master at {uri} does not answer, and '{where.hostname}' is not this machine"
+    if not _is_here(host):
+        return f"the ROS master at {uri} does not answer, and '{host}' is not this machine"
     if _taken(port):
         return f"another program, not a ROS master, uses port {port}; set ROS_MASTER_URI to a free port"
     if shutil.which("rosmaster") is None:
@@ -53,7 +50,17 @@ def obstacle(uri: str) -> str:
 
 def command(uri: str) -> list[str]:
     """The command that serves ``uri``, which has no `obstacle`."""
-    return [shutil.which("rosmaster") or "rosmaster", "--core", "-p", str(urlparse(uri).port or DEFAULT_PORT)]
+    return [shutil.which("rosmaster") or "rosmaster", "--core", "-p", str(_address(uri)[1])]
+
+
+def _address(uri: str) -> tuple[str, int]:
+    """Host and port of an address; an empty host or port 0 where it is none."""
+    try:
+        where = urlparse(uri)
+        host, port = where.hostname or "", DEFAULT_PORT if where.port is None else where.port
+    except ValueError:  # brackets without an address, a port that is no number
+        return "", 0
+    return (host, port) if where.scheme == "http" and not re.search(r"\s", uri) else ("", 0)
 
 
 def _is_here(host: str) -> bool:
@@ -61,7 +68,7 @@ def _is_here(host: str) -> bool:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind((host, 0))
-        except OSError:
+        except (OSError, TypeError, ValueError):  # a text that no host can have, too
             return False
     return True
 

@@ -191,7 +191,3 @@ class Loop:
         for problem in self._simulation.problems[:5]:
             report("warning", str(problem))
         self._simulation.problems.clear()
-
-
-if __name__ == "__main__":
-    main()

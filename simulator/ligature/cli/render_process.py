@@ -211,7 +211,3 @@ class Studio:
         figures["frames_dropped"] += np.uint64(missed)
         if drawn:
             figures["frame_seconds"] = seconds
-
-
-if __name__ == "__main__":
-    main()

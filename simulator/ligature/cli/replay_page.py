@@ -21,7 +21,8 @@ def show(files: list[Path], scene: Path | None, at: str, console: Console) -> in
     """Simulate records again, serve them, and wait for the end; the exit status is 1 where that is not possible."""
     try:
         reels = _reels(files, scene, console)
-        page = ReplayPage(reels, read_address(at), os.environ.get(TOKEN_VARIABLE, ""), console.print)
+        token, address = os.environ.get(TOKEN_VARIABLE, ""), read_address(at)
+        page = ReplayPage(reels, address, token, lambda text: console.print(text, markup=False))
     except ligature.SceneError as error:
         for diagnostic in error.diagnostics:
             console.print(str(diagnostic), style="red", markup=False)

@@ -51,7 +51,3 @@ def _haptics(options: RunOptions) -> dict[str, object]:
     if options.haptic_fixed:
         found["step"] = options.speed / (options.haptic_rate or HAPTIC_RATE)
     return found if options.haptic_forces is None else {**found, "forces": options.haptic_forces}
-
-
-if __name__ == "__main__":
-    main()

@@ -13,17 +13,17 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from queue import Empty, Queue
-from typing import NoReturn
+from typing import Any, NoReturn, TextIO, cast
 
 from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
 from ligature.bus.leftovers import remove, remove_leftovers
 from ligature.bus.stop import END_TIMEOUT, Stop, stop_on_signal
 from ligature.cli import master
 from ligature.cli.options import RunOptions
 from ligature.cli.ros_packages import ros_problem
-from ligature.process import end_with_parent, lower_priority
+from ligature.process import end_with_parent, lower_priority, program
 
 MASTER_TIMEOUT = 15.0
 LAST_TIMEOUT = 1.8
@@ -56,10 +56,31 @@ def supervise(options: RunOptions) -> NoReturn:
     Everything that the run had is gone by then. The interpreter would take apart what the simulator's modules hold,
     which takes a second on a busy machine.
     """
-    status = Supervisor(options).run()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    output = Output(sys.stdout)
+    status = Supervisor(options, Console(file=cast("TextIO", output), highlight=False, soft_wrap=True)).run()
+    output.flush()
     os._exit(status)
+
+
+class Output:
+    """A text file whose failures end nothing: a run goes on when its log's disk is full, or nobody reads its output."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+
+    def write(self, text: str) -> int:
+        """Write what can be written."""
+        with suppress(OSError):
+            self._file.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Hand on what can be handed on."""
+        with suppress(OSError):
+            self._file.flush()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
 
 
 class Child:
@@ -111,10 +132,10 @@ class Child:
 class Supervisor:
     """One run from start to end; `run` returns the exit status."""
 
-    def __init__(self, options: RunOptions, console: Console | None = None) -> None:
+    def __init__(self, options: RunOptions, console: Console) -> None:
         remove_leftovers()
         self._options = replace(options, bus=f"ligature-{os.getpid()}-{secrets.token_hex(4)}")
-        self._console = console or Console(highlight=False, soft_wrap=True)
+        self._console = console
         self._progress = self._console.status("loading the scene")
         self._events: Queue[Event] = Queue()
         self._children: dict[str, Child] = {}
@@ -147,31 +168,27 @@ class Supervisor:
         return self._over or self._signalled.is_set()
 
     def _start(self) -> None:
-        self._print(f"loading [bold]{escape(self._options.scene)}[/bold]")
+        self._console.print(Text.assemble("loading ", (self._options.scene, "bold")))
         for note in self._options.notes:
-            self._console.print(note, style="dim", markup=False)
+            self._print(note, "dim")
         problem = ros_problem() if self._options.ros else ""
         if problem:
             self._fail(problem)
             return
         self._progress.start()
         text = self._options.to_text()
-        self._children["physics"] = Child(
-            "physics", [sys.executable, "-m", "ligature.cli.physics", text], self._events, self._env
-        )
+        self._children["physics"] = Child("physics", program("ligature.cli.physics", text), self._events, self._env)
         if self._options.ros and self._master_begun():
-            self._children["ros"] = Child(
-                "ros", [sys.executable, "-m", "ligature.cli.ros_process", text], self._events, self._env
-            )
+            self._children["ros"] = Child("ros", program("ligature.cli.ros_process", text), self._events, self._env)
             if self._master_answers() and self._options.task:
                 self._children["tasks"] = Child(
-                    "tasks", [sys.executable, "-m", "ligature.cli.tasks_process", text], self._events, self._env
+                    "tasks", program("ligature.cli.tasks_process", text), self._events, self._env
                 )
 
     def _start_drawing(self, name: str, module: str, nice: int = _DRAWING_NICE) -> None:
         """Start a process that draws, by default at a lower scheduling priority; without a master the run is over."""
         if "ros" in self._children or not self._options.ros:
-            command = [sys.executable, "-m", module, self._options.to_text()]
+            command = program(module, self._options.to_text())
             self._children[name] = Child(name, command, self._events, self._env, nice)
 
     def _master_begun(self) -> bool:
@@ -228,10 +245,11 @@ class Supervisor:
         elif event == "first-state":
             self._progress.stop()
             if not self._published:
-                self._print(f"[green]first state published[/green] after {time.monotonic() - self._begin:.1f} s")
+                seconds = f" after {time.monotonic() - self._begin:.1f} s"
+                self._console.print(Text.assemble(("first state published", "green"), seconds))
             self._published = True
         elif event in _STYLES:
-            self._console.print(text, style=_STYLES[event], markup=False)
+            self._print(text, _STYLES[event])
             if event == "error":
                 self._status = 2
         elif event == "fatal":
@@ -239,7 +257,7 @@ class Supervisor:
         elif event == "ended":
             self._ended(process, int(text))
         elif process != "master" and text:
-            self._console.print(f"{process}: {text}", style="dim", markup=False)
+            self._print(f"{process}: {text}", "dim")
 
     def _ended(self, process: str, status: int) -> None:
         if self._stopping:
@@ -253,26 +271,23 @@ class Supervisor:
         lived = time.monotonic() - child.started
         child.quick_deaths = child.quick_deaths + 1 if lived < QUICK_DEATH else 0
         if child.quick_deaths > MAX_QUICK_DEATHS and process in _DRAWING:
-            self._print(
-                f"[yellow]the {process} process keeps failing (status {status}); continuing without it[/yellow]"
-            )
+            self._print(f"the {process} process keeps failing (status {status}); continuing without it", "yellow")
             return
         if child.quick_deaths > MAX_QUICK_DEATHS:
             self._fail(f"the {process} process keeps failing (status {status}); the run is over")
             return
-        self._print(f"[yellow]the {process} process ended with status {status}; restarting it[/yellow]")
+        self._print(f"the {process} process ended with status {status}; restarting it", "yellow")
         time.sleep(RESTART_PAUSE if child.quick_deaths else 0.0)
         child.start()
 
     def _fail(self, text: str) -> None:
-        self._console.print(text, style="red", markup=False)
+        self._print(text, "red")
         self._status = self._status or 1
         self._over = True
 
     def _end_all(self) -> None:
         self._over = True
-        with suppress(OSError):  # the terminal may be gone
-            self._progress.stop()
+        self._progress.stop()
         deadline = time.monotonic() + END_TIMEOUT
         order = [self._children[n] for n in (*_DRAWING, "tasks", "ros", "physics", "master") if n in self._children]
         for child in order[:-1] if "master" in self._children else order:
@@ -283,5 +298,5 @@ class Supervisor:
         remove(self._options.bus)
         self._print("ended")
 
-    def _print(self, text: str) -> None:
-        self._console.print(text)
+    def _print(self, text: str, style: str = "") -> None:
+        self._console.print(text, style=style, markup=False)

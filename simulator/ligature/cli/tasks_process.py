@@ -30,7 +30,3 @@ def log(line: str) -> None:
     """Print a line to the run's output."""
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
-
-
-if __name__ == "__main__":
-    main()

@@ -42,7 +42,3 @@ def _show(run: Run) -> None:
         time.sleep(max(MIN_FRAME_PERIOD - (time.monotonic() - begin), 0.0))
         period += SMOOTHING * (time.monotonic() - begin - period)
     windows.close()
-
-
-if __name__ == "__main__":
-    main()

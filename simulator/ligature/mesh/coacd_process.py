@@ -1,6 +1,6 @@
 """Runs CoACD in a separate process, so that a crash, a hang or Ctrl-C in its native code affects nothing else.
 
-``python -m ligature.mesh.coacd_process SETTINGS PARENT LIMIT``: standard input is an npz file of ``vertices`` (n, 3)
+Its arguments are SETTINGS PARENT LIMIT: standard input is an npz file of ``vertices`` (n, 3)
 and ``faces`` (m, 3), standard output gets one of an array (k, 3) of vertices per convex piece, SETTINGS is a JSON
 object of keyword arguments of ``coacd.run_coacd``, PARENT the id of the process that waits: this one ends with it.
 LIMIT is the maximum processor time in seconds. Any length unit.
@@ -19,8 +19,9 @@ import numpy as np
 from ligature.process import end_with_parent
 
 
-def main(settings: str, parent: str, limit: str) -> None:
+def main() -> None:
     """Decompose the mesh of standard input; what else is printed goes to the errors."""
+    settings, parent, limit = sys.argv[1:]
     end_with_parent(int(parent))
     resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 1))
     import coacd
@@ -35,7 +36,3 @@ def main(settings: str, parent: str, limit: str) -> None:
     np.savez(stored_pieces, **{f"{number:05d}": vertices for number, (vertices, _) in enumerate(pieces)})
     with os.fdopen(target, "wb") as out:
         out.write(stored_pieces.getvalue())
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

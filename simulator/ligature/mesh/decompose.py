@@ -14,7 +14,6 @@ import logging
 import os
 import signal
 import subprocess
-import sys
 import time
 import zipfile
 from collections.abc import Sequence
@@ -29,6 +28,7 @@ from ligature.cache import cache_folder, write_atomically
 from ligature.mesh.inertia import hull_properties, mass_properties
 from ligature.mesh.mesh import Array, Mesh
 from ligature.mesh.surface import convex_surface, extent_rank, hull_vertices, joined, open_edges, shells
+from ligature.process import program
 
 CONVEX_ENOUGH = 0.02
 """Largest part of its hull's volume by which a solid may fall short of it and still count as convex."""
@@ -268,7 +268,7 @@ def _run_coacd(mesh: bytes, settings: str, name: str) -> bytes:
     Logs a line with the ``name`` of the mesh every few seconds.
     """
     words = (settings, str(os.getpid()), str(CPU_LIMIT))
-    status, pieces, error = _wait([sys.executable, "-m", "ligature.mesh.coacd_process", *words], mesh, name)
+    status, pieces, error = _wait(program("ligature.mesh.coacd_process", *words), mesh, name)
     if status == -signal.SIGXCPU:
         reason = f"CoACD took longer than {CPU_LIMIT} s of processor time; simplify the mesh"
         raise DecompositionError(reason, lasting=True)
