@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
+
+_READ = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
+"""How files are opened; Blender runs on systems that have not all of it."""
+
+_MOST_LETTERS = 50
+"""Of the name of an object in that of a file: of up to four bytes each, file systems take 255."""
 
 
 def reason(error: OSError) -> str:
@@ -41,7 +49,7 @@ def open_file(path: Path) -> BinaryIO:
 
     What was opened is looked at, so that a file may become a pipe at any moment: opening that does not wait either.
     """
-    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    number = os.open(path, _READ)
     try:
         _check_regular(os.fstat(number).st_mode, path)
         return os.fdopen(number, "rb")
@@ -57,6 +65,49 @@ def naming(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise OSError(error.errno, reason(error), str(path)) from error
+
+
+def check_folder(folder: Path) -> None:
+    """Create a folder where it is missing, and write to it; raises OSError, before anything is computed for it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with naming(folder):
+        tempfile.TemporaryFile(dir=folder).close()
+
+
+def part_of(path: Path) -> Path:
+    """What the recording ``path`` is called until it is whole; to be opened with the mode ``x``.
+
+    Raises FileExistsError where one of the two exists: nothing is written over what somebody else records, or left.
+    """
+    part = path.with_name(f"{path.name}.active")
+    if path.exists():
+        raise FileExistsError(f"'{path}' exists already; choose another name")
+    if part.exists():
+        raise FileExistsError(
+            f"'{part}' belongs to a recording that is still running or was killed; delete it or choose another name"
+        )
+    return part
+
+
+def give_name(part: Path, path: Path) -> None:
+    """Rename the file ``part`` to ``path``; raises FileExistsError where that exists by now, and OSError."""
+    taken = FileExistsError(f"'{path}' exists by now; the recording is in '{part}'")
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise taken from None
+    except OSError:  # a file system without hard links
+        if path.exists():
+            raise taken from None
+        part.replace(path)
+    else:
+        part.unlink()
+
+
+def as_file_name(name: str) -> str:
+    """The name of an object as that of a file: without folders, not hidden, and short enough to get an ending."""
+    plain = re.sub(r"[/\\\x00-\x1f]", "_", name)[:_MOST_LETTERS]
+    return f"_{plain}" if plain.startswith(".") or not plain else plain
 
 
 def _check_regular(mode: int, path: Path) -> None:

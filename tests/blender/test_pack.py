@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import subprocess
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -33,6 +35,36 @@ def test_packed_modules_import_each_other_relatively_and_the_rooms_know_no_blend
         if "ligature" in module.relative_to(addon).parts:
             assert not re.search(r"^\s*(from|import) (bpy|mathutils|bmesh)\b", text, re.MULTILINE), module
             assert not re.search(r"^(from|import) (scipy|numba|trimesh)\b", text, re.MULTILINE), module
+
+
+WITHOUT_POSIX = """
+import importlib, os, pathlib, signal, sys, tempfile, types
+import concurrent.futures.thread, numpy, subprocess, yaml
+for name in ("O_NONBLOCK", "O_CLOEXEC", "O_DIRECTORY", "O_NOFOLLOW", "getuid", "geteuid", "getgid", "fork", "mkfifo", "setsid",
+             "killpg", "posix_fallocate", "pread", "pipe2", "register_at_fork", "sched_setscheduler", "nice", "WNOHANG"):
+    delattr(os, name)
+for name in ("SIGKILL", "SIGHUP", "SIGALRM", "SIGQUIT", "SIGXCPU", "setitimer", "pthread_sigmask"):
+    delattr(signal, name)
+for name in ("fcntl", "resource", "pwd", "grp", "termios", "pty"):
+    sys.modules[name] = None
+addon, folder = map(pathlib.Path, sys.argv[1:])
+package = sys.modules[addon.name] = types.ModuleType(addon.name)
+package.__path__ = [str(addon)]  # without its own module, which needs Blender
+for path in sorted((addon / "ligature").rglob("*.py")):
+    importlib.import_module(".".join(path.relative_to(addon.parent).with_suffix("").parts).removesuffix(".__init__"))
+from adf_studio.ligature.adf import Resolver, read_any
+from adf_studio.ligature.authoring.save import save_all
+save_all({folder / "m.yaml": b"bodies: [A]\\nA: {name: a, mass: 0}\\n"})
+print(read_any(folder / "m.yaml", Resolver.for_file(folder / "m.yaml")).kind)
+"""
+
+
+def test_the_packed_modules_work_without_what_windows_lacks(pack: ModuleType, tmp_path: Path) -> None:
+    addon = pack.stage(tmp_path, vendored=False)
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_POSIX, addon, tmp_path], capture_output=True, text=True, cwd=tmp_path, timeout=60
+    )
+    assert (done.stdout, done.returncode) == ("model\n", 0), done.stderr
 
 
 def test_version_branches_stand_in_one_file() -> None:

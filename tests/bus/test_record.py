@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import struct
+from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,6 +18,8 @@ from ligature.bus import record as records
 from ligature.bus.record import MOST_UPDATES, Excerpt, Header, Moment, Record, RecordError, RecordWriter, is_record
 from ligature.model.commands import BodyCommand, Command, CommandType, Reset
 from ligature.robots.commands import ServoJp
+
+Begin = Callable[[Path, RecordWriter], RecordWriter | Excerpt]
 
 HEADER = Header('{"scene": "a.yaml"}', "ab" * 32)
 COMMANDS: list[tuple[int, Command]] = [
@@ -83,8 +88,9 @@ def test_a_part_without_commands_begins_and_ends_after_the_right_updates(tmp_pat
 def test_a_part_that_the_disk_does_not_take_leaves_nothing(tmp_path: Path) -> None:
     """/dev/full is a disk without room."""
     writer = RecordWriter(tmp_path / "run.record", HEADER)
-    (tmp_path / "part.record.active").symlink_to("/dev/full")
     part = Excerpt(tmp_path / "part.record", writer, writer.moment(1, "ef" * 32))
+    with open("/dev/full", "wb") as full:
+        os.dup2(full.fileno(), part._file.fileno())
     with pytest.raises(OSError, match="No space left"):
         part.finish(writer.moment(2, "01" * 32))
     writer.finish(2, "cd" * 32)
@@ -160,20 +166,43 @@ def test_bytes_that_are_no_command_are_reported_with_their_place(whole: Path) ->
         Record.read(whole)
 
 
-def test_records_replace_nothing(whole: Path) -> None:
-    before = whole.read_bytes()
-    with pytest.raises(FileExistsError, match="choose another name"):
-        RecordWriter(whole, HEADER)
-    assert whole.read_bytes() == before
+@pytest.mark.parametrize("begin", [
+    lambda path, journal: RecordWriter(path, HEADER),
+    lambda path, journal: Excerpt(path, journal, journal.moment(1, "ef" * 32)),
+], ids=["run", "part"])  # fmt: skip
+@given(names=strategies.sets(strategies.sampled_from(["a.record", "a.record.active"])), late=strategies.booleans())
+def test_records_replace_nothing(begin: Begin, names: set[str], late: bool) -> None:
+    """Neither a record nor what is recorded or was left by a killed run, nor what appears under the name meanwhile."""
+    with TemporaryDirectory() as folder:
+        journal, path = RecordWriter(Path(folder, "journal"), HEADER), Path(folder, "a.record")
+        for name in names:
+            Path(folder, name).write_text(name)
+        if names:
+            with pytest.raises(FileExistsError, match="choose another name"):
+                begin(path, journal)
+        else:
+            record = begin(path, journal)
+            if late:
+                path.write_text("a.record")
+            with pytest.raises(FileExistsError, match="is in '.*a.record.active'") if late else nullcontext():
+                end = journal.moment(2, "01" * 32)
+                record.finish(end) if isinstance(record, Excerpt) else record.finish(2, "01" * 32)
+            assert Record.read(Path(folder, "a.record.active") if late else path).updates == 2
+            names = {"a.record"} if late else set()
+        assert all(Path(folder, name).read_text() == name for name in names)
+        journal.abandon()
 
 
 def test_a_full_disk_leaves_nothing_under_the_final_name(tmp_path: Path) -> None:
-    """/dev/full is a disk without room: the file that is written to becomes it."""
-    path = tmp_path / "run.record"
-    (tmp_path / "run.record.active").symlink_to("/dev/full")
-    with pytest.raises(OSError, match="No space left"):
-        RecordWriter(path, HEADER)
-    assert not path.exists()
+    """Files may have 10 bytes."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (10, limits[1]))
+        with pytest.raises(OSError, match="File too large"):
+            RecordWriter(tmp_path / "run.record", HEADER)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_longest_run_is_read(tmp_path: Path) -> None:

@@ -284,6 +284,10 @@ def test_the_command_exports_and_says_what_is_wrong(source: Path, tmp_path: Path
         done = run(app, ["dataset", "export", str(source), str(tmp_path / "other"), *words])
         assert done.exit_code == 1 and message in done.output
     assert not (tmp_path / "other").exists()
+    (tmp_path / "other.part").mkdir()
+    done = run(app, ["dataset", "export", str(source), str(tmp_path / "other")])
+    assert done.exit_code == 1 and "other.part' belongs to an export that is still running or was killed" in done.output
+    assert (tmp_path / "other.part").is_dir()
     done = run(app, ["dataset", "info", str(source)])
     assert done.exit_code == 0 and "episode_0001: 104 samples, failure; reach 52, back 52" in done.output
     assert "episode_0003: 102 samples, not judged" in done.output

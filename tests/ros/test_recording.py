@@ -222,18 +222,22 @@ def test_recordings_that_cannot_be_made_are_reported_and_leave_nothing(session: 
     from ligature.cli.record import record
 
     there = tmp_path / "there.bag"
-    there.write_text("mine")
+    mine = [there, tmp_path / "running.part.bag", tmp_path / "cut.part.bag.active"]
+    for path in mine:
+        path.write_text("mine")
     for out, free, message in (
         (tmp_path / "a.bag", 1e9, "space free on disk"),
         (there, 1.0, "exists already"),
         (tmp_path / "a.txt", 1.0, "must end in .bag"),
-        (tmp_path / "no" / "a.bag", 1.0, "is not writable"),
+        (tmp_path / "no" / "a.bag", 1.0, "does not exist; create it first"),
+        (tmp_path / "running.bag", 1.0, "running.part.bag' belongs to a recording that is still running or was killed"),
+        (tmp_path / "cut.bag", 1.0, "cut.part.bag.active' belongs to a recording that is still running or was cut off"),
     ):
         console = Console(file=io.StringIO(), soft_wrap=True)
         assert record(out, "", 2.0, free, console) == 1
         assert message in console.file.getvalue()  # type: ignore[attr-defined]
-    assert [path.name for path in tmp_path.iterdir()] == ["there.bag"]
-    assert there.read_text() == "mine"
+    assert sorted(tmp_path.iterdir()) == sorted(mine)
+    assert all(path.read_text() == "mine" for path in mine)
 
 
 def test_a_run_whose_record_exists_ends_and_reports_it(session: Session) -> None:

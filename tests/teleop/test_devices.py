@@ -14,7 +14,7 @@ from ligature.teleop.devices import KINDS, module
 from ligature.teleop.devices.device import STILL, Device, RateHand, Reading
 from ligature.teleop.devices.keyboard import Adapter as Keyboard
 from ligature.teleop.handset import Handset, Press
-from ligature.teleop.record import Recorder, Replay
+from ligature.teleop.record import Recorder, Replay, recording
 
 
 def test_every_kind_has_an_adapter() -> None:
@@ -121,3 +121,23 @@ def test_a_file_that_is_no_record_is_reported_with_its_line(tmp_path: Path, line
     (tmp_path / "record.jsonl").write_text('{"t": 0, "event": "clutch", "value": true}\n' + line + "\n")
     with pytest.raises(ValueError, match=r"record.jsonl:2: neither a reading of a device nor an event"):
         Replay(tmp_path / "record.jsonl")
+
+
+@pytest.mark.parametrize("name", ["input.jsonl", "input.jsonl.active", ""])
+def test_what_is_recorded_replaces_nothing_and_is_kept_whatever_ends_it(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "input.jsonl"
+    if name:
+        (tmp_path / name).write_text("mine")
+        with pytest.raises(FileExistsError, match="choose another name"), recording(path):
+            pass
+        assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [(name, "mine")]
+        return
+    with pytest.raises(KeyboardInterrupt), recording(path) as recorder:
+        recorder.event(1.0, "enable", True)
+        raise KeyboardInterrupt
+    assert [file.name for file in tmp_path.iterdir()] == ["input.jsonl"]
+    assert list(Replay(path).due(1.0)) == [("enable", True)]
+    path.unlink()
+    with recording(path):
+        pass
+    assert not list(tmp_path.iterdir())

@@ -22,7 +22,7 @@ from typing import BinaryIO
 from ligature.bus.codec import CodecError, decode, encode
 from ligature.bus.ring import MOST_BYTES
 from ligature.model.commands import Command
-from ligature.paths import open_file
+from ligature.paths import give_name, open_file, part_of
 
 FORMAT = "ligature record 3"
 END, BEGIN = 0xFFFFFFFF, 0xFFFFFFFE
@@ -110,14 +110,21 @@ class RecordWriter(Journal):
 
     def __init__(self, path: Path, header: Header) -> None:
         self._path, self._part = path, part_of(path)
-        super().__init__(self._part.open("w+b"), header)
+        file = self._part.open("x+b")
+        try:
+            super().__init__(file, header)
+        except OSError:
+            with suppress(OSError):
+                file.close()
+            self._part.unlink()
+            raise
 
     def finish(self, update: int, state_hash: str) -> None:
         """End with the hash of the state after ``update`` updates; now the file gets its name."""
         self._put(_HEAD.pack(update, END) + bytes.fromhex(state_hash))
         self._file.write(self._digest.digest())
         self._file.close()
-        self._part.replace(self._path)
+        give_name(self._part, self._path)
 
     def abandon(self) -> Path:
         """Stop writing; returns where what was written stays."""
@@ -134,7 +141,7 @@ class Excerpt:
     def __init__(self, path: Path, journal: Journal, begin: Moment) -> None:
         self.path, self.begin = path, begin
         self._journal, self._part = journal, part_of(path)
-        self._file = self._part.open("wb")
+        self._file = self._part.open("xb")
 
     def finish(self, end: Moment) -> None:
         """Write all of it, and give the file its name; takes as long as the disk does, on any thread."""
@@ -151,23 +158,16 @@ class Excerpt:
             put(_HEAD.pack(end.update, END) + bytes.fromhex(end.state))
             file.write(digest.digest())
             file.close()
-            self._part.replace(self.path)
         except OSError:
             self.drop()
             raise
+        give_name(self._part, self.path)
 
     def drop(self) -> None:
         """Write nothing."""
         with suppress(OSError):
             self._file.close()
         self._part.unlink(missing_ok=True)
-
-
-def part_of(path: Path) -> Path:
-    """What the record ``path`` is called until it is whole; raises FileExistsError when there is one."""
-    if path.exists():
-        raise FileExistsError(f"'{path}' exists already; choose another name")
-    return path.with_name(f"{path.name}.active")
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.paths import give_name, reason
 from ligature.process import end_with_parent
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m|\[[0-9.]+\]: |\[ ?(INFO|WARN|ERROR)\] ")
@@ -33,26 +34,28 @@ def recorder() -> Path | None:
 
 def record(out: Path, exclude: str, seconds: float, keep_free: float, console: Console) -> int:
     """Record until Ctrl-C, or for ``seconds``; ``keep_free`` gigabytes stay free. Returns the exit status."""
-    problem = _obstacle(out)
+    part = out.with_name(f"{out.stem}.part.bag")
+    problem = _obstacle(out) or _reserved(part)
     if problem:
         console.print(problem, style="red", markup=False)
         return 1
-    part = out.with_name(f"{out.stem}.part.bag")
     command = [str(recorder()), "-a", "-O", str(part), f"--min-space={max(1, round(1e6 * keep_free))}k", *_commanded()]
     if exclude:
         command += ["-x", exclude]
     console.print(f"recording to '{out}'; Ctrl-C ends it", markup=False)
     lines, status = _run(command, seconds)
-    reason = _reason(lines)
-    if reason or status != 0 or not part.is_file():
+    why = _reason(lines)
+    if why or status != 0 or not part.stat().st_size:
         free = shutil.disk_usage(out.parent).free / 1e9
-        reason = reason or f"the recorder ended with status {status}"
-        console.print(
-            f"the recording failed: {reason}; {free:.3g} GB of disk space are free", style="red", markup=False
-        )
+        why = why or f"the recorder ended with status {status}"
+        console.print(f"the recording failed: {why}; {free:.3g} GB of disk space are free", style="red", markup=False)
         _report_rest(part, console)
         return 1
-    part.replace(out)
+    try:
+        give_name(part, out)
+    except OSError as error:
+        console.print(str(error), style="red", markup=False)
+        return 1
     console.print(f"{out}: {out.stat().st_size / 1e6:.1f} MB", markup=False)
     return 0
 
@@ -65,12 +68,32 @@ def _obstacle(out: Path) -> str:
         return f"'{out}' must end in .bag"
     if out.exists():
         return f"'{out}' exists already; choose another name"
+    if not out.parent.is_dir():
+        return f"the folder '{out.parent}' does not exist; create it first"
     if not os.access(out.parent, os.W_OK):
         return f"the folder '{out.parent}' is not writable"
     uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
     if not master_answers(uri):
         return f"no ROS master answers at {uri}; start the simulator with 'ligature run' first"
     return ""
+
+
+def _reserved(part: Path) -> str:
+    """Take the name ``part`` for a recording; else the reason why not. The recorder would write over what has it."""
+    if (active := _active(part)).exists():
+        return f"'{active}' belongs to a recording that is still running or was cut off; choose another name"
+    try:
+        part.touch(exist_ok=False)
+    except FileExistsError:
+        return f"'{part}' belongs to a recording that is still running or was killed; delete it or choose another name"
+    except OSError as error:
+        return f"'{part}' cannot be written: {reason(error)}; choose another folder or name"
+    return ""
+
+
+def _active(part: Path) -> Path:
+    """What the recorder calls ``part`` while it writes."""
+    return part.with_name(f"{part.name}.active")
 
 
 def _commanded() -> list[str]:
@@ -117,6 +140,6 @@ def _reason(lines: list[str]) -> str:
 def _report_rest(part: Path, console: Console) -> None:
     """Remove an empty bag; name the file of one that was cut off."""
     part.unlink(missing_ok=True)
-    active = part.with_name(f"{part.name}.active")
+    active = _active(part)
     if active.exists():
         console.print(f"the part recorded before is in '{active}'; 'rosbag reindex' may repair it", markup=False)

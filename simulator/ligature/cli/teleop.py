@@ -13,6 +13,7 @@ from rich.console import Console
 from ligature.adf.diagnostics import AdfError
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.paths import reason
 from ligature.teleop import config
 from ligature.teleop.config import TeleopConfig
 from ligature.teleop.ready import of_devices
@@ -70,24 +71,31 @@ def _on_ros(
     from ligature.ros.start import start_node
     from ligature.teleop.guide import calibration_of
     from ligature.teleop.node import Teleop
-    from ligature.teleop.record import Recorder, Replay
+    from ligature.teleop.record import Replay, recording
 
     start_node("ligature_teleop", several=True)
     try:
         if calibrate is not None:
-            block = calibration_of(wanted, calibrate, console.input, console.print)
+            block = calibration_of(
+                wanted, calibrate, lambda text: console.input(text, markup=False),
+                lambda text: console.print(text, markup=False),
+            )  # fmt: skip
             console.print(block, markup=False, end="")
             return 0
         stop = stop_on_signal(
             (signal.SIGINT, signal.SIGTERM), END_TIMEOUT
         )  # not before: Ctrl-C ends a question of the guide
         with ExitStack() as files:
-            recorder = Recorder(files.enter_context(record.open("w", encoding="utf-8"))) if record else None
-            node = Teleop(wanted, recorder, Replay(replay) if replay else None)
+            played = Replay(replay) if replay else None
+            node = Teleop(wanted, files.enter_context(recording(record)) if record else None, played)
             pairs = (f"{leader} → {wanted.begins_with(leader) or config.NOBODY}" for leader in wanted.pairs)
-            console.print(f"driving: {', '.join(pairs)}")
+            console.print(f"driving: {', '.join(pairs)}", markup=False)
             node.run(stop.is_set)
-    except (ValueError, OSError, RuntimeError) as error:
+    except OSError as error:
+        named = f"{error.filename}: " if error.filename else ""
+        console.print(f"{named}{reason(error)}", style="red", markup=False)
+        return 1
+    except (ValueError, RuntimeError) as error:
         console.print(str(error), style="red", markup=False)
         return 1
     return 0

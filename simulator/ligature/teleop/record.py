@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
 
-from ligature.paths import open_file
+from ligature.paths import give_name, open_file, part_of
 from ligature.teleop.devices.device import Reading
 
 
@@ -38,6 +39,21 @@ class Recorder:
     def event(self, now: float, name: str, value: Any) -> None:
         """Write a pedal or a switch."""
         self._line(now, event=name, value=value)
+
+
+@contextmanager
+def recording(path: Path) -> Iterator[Recorder]:
+    """Records to ``path``, which is called so at the end, however that comes; raises OSError where it exists."""
+    part = part_of(path)
+    with part.open("x", encoding="utf-8") as out:
+        try:
+            yield Recorder(out)
+        finally:
+            out.flush()
+            if part.stat().st_size:
+                give_name(part, path)
+            else:
+                part.unlink()
 
 
 class Replay:

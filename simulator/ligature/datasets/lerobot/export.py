@@ -58,7 +58,9 @@ class _Written:
         return self.tasks.index(text)
 
 
-def export(source: Path, target: Path, format: str, codec: str = "h264", license: str = "", log: Log = print) -> None:
+def export(
+    source: str | Path, target: str | Path, format: str, codec: str = "h264", license: str = "", log: Log = print
+) -> None:
     """Write the dataset ``source`` as the folder ``target``, which must not exist.
 
     Parameters
@@ -82,15 +84,21 @@ def export(source: Path, target: Path, format: str, codec: str = "h264", license
     for what, value, known in (("format", format, FORMATS), ("codec", codec, tuple(CODECS))):
         if value not in known:
             raise ValueError(f"{what} must be one of {', '.join(known)}, not '{value}'")
+    source, target = Path(source), Path(target)
     if target.exists():
         raise DatasetError(f"'{target}' exists already; choose another name")
     part = target.with_name(f"{target.name}.part")
     with opened(source) as file:
         _check(file, source)
-        if part.exists():
-            shutil.rmtree(part)
         try:
             part.mkdir(parents=True)
+        except FileExistsError:
+            raise DatasetError(
+                f"'{part}' belongs to an export that is still running or was killed; delete it or choose another name"
+            ) from None
+        except OSError as error:
+            raise DatasetError(f"cannot write '{target}': {reason(error)}") from error
+        try:
             _Export(file, part, format, CODECS[codec], license, log).run()
             part.replace(target)
         except OSError as error:
