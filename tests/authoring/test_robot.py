@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from xml.sax.saxutils import quoteattr
 
 import ligature
 import numpy as np
@@ -33,6 +35,7 @@ from ligature.authoring.save import checked_text
 from ligature.authoring.shapes import Shape
 from ligature.cli.main import app
 from ligature.mesh.inertia import box_properties
+from ligature.mesh.load import load_mesh
 from typer.testing import CliRunner
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -275,6 +278,46 @@ def test_a_limit_that_urdf_leaves_out_is_zero(tmp_path: Path, limit: str, expect
     )
     (joint,) = read_urdf(tmp_path / "r.urdf").joints
     assert (joint.lower, joint.upper) == expected
+
+
+ODD = st.text("ab/._\\ \u624b", min_size=1, max_size=4).map(lambda text: text.replace("b", "_collision")) | st.sampled_from(
+    ["/abs/olute", "../../up", "x" * 300, ".hidden", "a", "a_2", "a_collision"]
+)  # fmt: skip
+"""Names of links and bodies."""
+
+
+@settings(max_examples=12)
+@given(names=st.lists(ODD, min_size=1, max_size=5, unique_by=str.strip))
+def test_links_of_any_name_have_meshes_of_their_own_beside_the_model(names: list[str]) -> None:
+    """Each has another number of triangles to look at, and to collide by: written, read back, and turned into URDF."""
+    with TemporaryDirectory() as place:
+        folder = Path(place, "in", "out")
+        folder.mkdir(parents=True)
+        links = []
+        for number, name in enumerate(names):
+            for kind, faces in (("visual", 2 * number + 1), ("collision", 2 * number + 2)):
+                text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n" + "f 1 2 3\nf 1 2 4\n" * faces
+                (folder / f"{kind}{number}.obj").write_text(text)
+            parts = (
+                f'<{kind}><geometry><mesh filename="{kind}{number}.obj"/></geometry></{kind}>'
+                for kind in ("visual", "collision")
+            )
+            links.append(f"<link name={quoteattr(name)}>{''.join(parts)}</link>")
+        (folder / "r.urdf").write_text(f"<robot name='r'>{''.join(links)}</robot>", "utf-8")
+        written = folder / "made"
+        done = CliRunner().invoke(app, ["convert", str(folder / "r.urdf"), "-o", str(written / "m.yaml")])
+        assert done.exit_code == 0, done.output
+        assert {path.name for path in Path(place).rglob("*")} - {path.name for path in written.rglob("*")} == {
+            "in", "out", "made", "r.urdf", *(f"{k}{n}.obj" for n in range(len(names)) for k in ("visual", "collision")),
+        }  # fmt: skip
+        scene = ligature.load(written / "m.yaml")
+        drawn = [body.visual.mesh for body in scene.bodies]
+        shown = [sum(len(part.faces) for part in load_mesh(path, Resolver([written])).parts) for path in drawn if path]
+        assert shown == [2 * (2 * number + 1) for number in range(len(names))]
+        back = exported(read_any(written / "m.yaml", Resolver([written])), Resolver([written]), "m")
+        files = [look.shape.name for link in back.robot.links for look in (*link.visuals, *link.collisions)]
+        assert len(set(files)) == len(files) == 2 * len(names)
+        assert all(Path(file).parent == Path("meshes") and file in back.files for file in files)
 
 
 LINKS = '<link name="a"/><link name="b"/>'

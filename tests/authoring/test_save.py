@@ -50,6 +50,30 @@ def test_a_file_reached_through_a_folder_that_is_missing_yet_is_known(tmp_path: 
     assert (tmp_path / "a").read_bytes() == b"old"
 
 
+@pytest.mark.parametrize("umask", [0o022, 0o077])
+def test_who_may_read_and_write_a_file_stays(tmp_path: Path, umask: int) -> None:
+    modes = dict.fromkeys(("a", "b"), 0o600) | {"c": 0o664, "d": 0o755}
+    for name, mode in modes.items():
+        (tmp_path / name).touch()
+        (tmp_path / name).chmod(mode)
+    before = os.umask(umask)
+    try:
+        save_all({tmp_path / name: b"new" for name in (*modes, "fresh")})
+    finally:
+        os.umask(before)
+    found = {path.name: path.stat().st_mode & 0o777 for path in tmp_path.iterdir()}
+    assert found == {**modes, "fresh": 0o666 & ~umask}
+
+
+def test_a_protected_file_and_the_others_stay_as_they_were(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "mine").chmod(0o444)
+    with pytest.raises(SaveError, match="mine' is write-protected"):
+        save_all({tmp_path / "a": b"new", tmp_path / "mine": b"new"})
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
+    assert save_all({tmp_path / "mine": b"mine"}) == []
+
+
 def test_text_that_cannot_be_read_back_is_refused(tmp_path: Path) -> None:
     assert checked_text("a: 1\n", tmp_path / "m.yaml") == b"a: 1\n"
     with pytest.raises(SaveError, match="'m.yaml' would not be readable"):

@@ -114,6 +114,28 @@ def test_commands_write_the_file_of_that_name_or_report_why_not(
         assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()} == before, printed
 
 
+@pytest.mark.parametrize("way", ["the same name", "another folder's name", "a link"])
+@pytest.mark.parametrize("words", WRITERS.values(), ids=WRITERS)
+def test_no_command_writes_over_what_it_reads(
+    words: list[str], way: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder, source = tmp_path / "folder", words[1]
+    folder.mkdir()
+    (folder / source).write_text({"box.yaml": BOX, "box.urdf": URDF, "tri.obj": TRI}[source])
+    monkeypatch.chdir(folder)
+    if way == "a link":
+        (folder / "link").symlink_to(source)
+    out = {"the same name": source, "another folder's name": f"../folder/{source}", "a link": "link"}[way]
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    monkeypatch.setattr(sys, "argv", ["ligature", *(out if word == "OUT" else word for word in words)])
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    with pytest.raises(SystemExit) as ended:
+        command.ligature()
+    printed = "".join(capfd.readouterr())
+    assert ended.value.code == 1 and "is the file that is read; write to another name" in printed, printed
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
 @pytest.mark.parametrize("scene", ["none.yaml", "x" * 300])
 def test_compile_says_why_a_scene_cannot_run(scene: str, tmp_path: Path) -> None:
     done = subprocess.run(

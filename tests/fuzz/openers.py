@@ -60,7 +60,6 @@ OURS: dict[str, str] = {
     "authoring/lint/files.py:material_dialect": "reads by a resolver what `mesh.obj` has read",
     "authoring/lint/files.py:file_unreferenced": "looks for names in scene files, by a resolver",
     "authoring/lint/files.py:_same_bytes": "compares bytes, by a resolver",
-    "authoring/save.py:_staged": "writes",
     "authoring/save.py:_content": "compares bytes with those to be written",
     "blas.py:_has_avx2": "what Linux says of the processor",
     "blas.py:loaded": "what Linux says of the process",

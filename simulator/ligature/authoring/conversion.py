@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,10 @@ from ligature.authoring.generate import Parts
 from ligature.authoring.placement import pose_of
 from ligature.authoring.shapes import Shape, shape_mesh
 from ligature.mesh.mesh import Material, Mesh, MeshPart
+from ligature.paths import as_file_name
+
+COLLIDING = "_collision.OBJ"
+"""How names of mesh files end that collide, and no others."""
 
 
 @dataclass
@@ -46,7 +51,7 @@ def shape_keys(
             ),
         )
     elif parts:
-        name = f"{owner}{'_collision' if prefix else ''}.OBJ"
+        name = _file_of(owner, COLLIDING if prefix else ".OBJ", meshes)
         drawn = [shape_part(f"{shape.kind.lower()}_{i}", shape, T) for i, (shape, T) in enumerate(primitives)]
         meshes[name] = Mesh(Path(name), (*parts, *drawn))
         yield f"{prefix}mesh", name
@@ -54,6 +59,12 @@ def shape_keys(
             yield "collision mesh type", "CONVEX_HULL"
     elif prefix:
         yield "collision mesh", ""  # otherwise the visual mesh would collide
+
+
+def _file_of(owner: str, ending: str, meshes: Mapping[str, Mesh]) -> str:
+    """A name of a mesh file that is none of ``meshes``: links may be called ``arm/base``, or by a path elsewhere."""
+    numbered = (f"{as_file_name(owner)}{f'_{number}' if number > 1 else ''}{ending}" for number in count(1))
+    return next(file for file in numbered if file not in meshes and file.endswith(COLLIDING) is (ending == COLLIDING))
 
 
 def shape_part(name: str, shape: Shape, T: Array, material: Material | None = None) -> MeshPart:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import secrets
 import shutil
 import stat
 import tempfile
@@ -18,6 +19,11 @@ from ligature.paths import naming, open_file, real_path, reason
 
 WRITERS = 16
 """Files that are written at a time."""
+
+_MOST_LETTERS = 50
+"""Of a name within that of a temporary file."""
+
+_WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
 class SaveError(OSError):
@@ -36,6 +42,7 @@ def save_all(files: Mapping[Path, bytes], roots: Collection[Path] | None = None)
     _refuse_devices(files)
     changed = {path: data for path, data in files.items() if _content(path) != data}
     refuse_outside(changed, roots)
+    _refuse_protected(changed)
     folders = [folder for path in changed for folder in (path.parent, *path.parent.parents) if not folder.exists()]
     with ThreadPoolExecutor(WRITERS) as pool:  # most of the time goes to waiting for the disk
         writing = [(pool.submit(_staged, path, data), path) for path, data in changed.items()]
@@ -60,6 +67,19 @@ def save_all(files: Mapping[Path, bytes], roots: Collection[Path] | None = None)
     return list(changed)
 
 
+def refuse_input(out: Path, *read: Path) -> None:
+    """Raise `SaveError` where ``out`` is one of the files that it is made of, which would be lost."""
+    if any(_same(out, path) for path in read):
+        raise SaveError(f"'{out}' is the file that is read; write to another name")
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except OSError:  # one of them is missing
+        return False
+
+
 def refuse_outside(files: Iterable[Path], roots: Collection[Path] | None) -> None:
     """Raise `SaveError` when a file lies outside the folders ``roots``, links resolved; None allows all."""
     if roots is None:
@@ -82,6 +102,17 @@ def _refuse_devices(files: Iterable[Path]) -> None:
             continue
         if system or not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             raise SaveError(f"'{path}' is a device or a pipe, which no file may replace; give another name")
+
+
+def _refuse_protected(files: Iterable[Path]) -> None:
+    """Raise `SaveError` for a file that may not be written: that its folder may is no leave to replace it."""
+    for path in files:
+        try:
+            mode = path.stat().st_mode
+        except OSError:
+            continue
+        if stat.S_ISREG(mode) and not (mode & _WRITE and os.access(path, os.W_OK)):
+            raise SaveError(f"'{path}' is write-protected; allow writing (chmod u+w), or give another name")
 
 
 def foreign(files: Mapping[Path, bytes], own: Mapping[str, str]) -> list[Path]:
@@ -157,14 +188,15 @@ def _staged(path: Path, data: bytes) -> str:
     """A temporary file beside ``path`` with its content on the disk."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with naming(path):
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        part = path.parent / f".{path.name[:_MOST_LETTERS]}.{secrets.token_hex(4)}"
         try:
-            with os.fdopen(handle, "wb") as file:
+            with part.open("xb") as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-            os.chmod(name, 0o644)
+            with suppress(FileNotFoundError):
+                part.chmod(stat.S_IMODE(path.stat().st_mode))  # who may read and write it stays
         except OSError:
-            os.unlink(name)
+            part.unlink(missing_ok=True)
             raise
-    return name
+    return str(part)

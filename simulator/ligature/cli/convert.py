@@ -10,11 +10,11 @@ from rich.console import Console
 from ligature.adf import AdfError, Resolver, read_any
 from ligature.adf.patch import PatchError
 from ligature.adf.update import new_text
-from ligature.authoring.conversion import Converted
+from ligature.authoring.conversion import COLLIDING, Converted
 from ligature.authoring.mjcf import from_mjcf
 from ligature.authoring.objfile import MeshWriteError, Paint, Surface, obj_texts
 from ligature.authoring.robot import exported, read_sdf, read_urdf, sdf_text, to_adf, urdf_text
-from ligature.authoring.save import SaveError, checked_text, save_all
+from ligature.authoring.save import SaveError, checked_text, refuse_input, save_all
 from ligature.authoring.xml_files import XmlError, check_xml
 from ligature.cli.numbers import counted
 from ligature.paths import real_path, reason
@@ -43,7 +43,8 @@ def convert(source: Path, out: Path, namespace: str, console: Console) -> int:
         check_xml(source)
         converted = _robot(source)
         with signals_held():
-            written = save_all(_files(converted, real_path(out), namespace))
+            refuse_input(out, source)
+            written = save_all(_files(converted, real_path(out), namespace), [real_path(out).parent])
     except (SaveError, PatchError, MeshWriteError) as error:
         console.print(f"{source}: it cannot be written as ADF: {error}", style="red", markup=False)
         return 1
@@ -103,11 +104,13 @@ def _export(source: Path, out: Path, console: Console) -> int:
         if document.kind != "model":
             console.print(f"{source}: this is a {document.kind} file; give a model", style="red", markup=False)
             return 1
+        refuse_input(out, source)
         done = exported(document, resolver, out.stem)
         text, notes = WRITTEN[out.suffix.lower()](done.robot)
         folder = real_path(out).parent
         with signals_held():
-            written = save_all({**{folder / n: data for n, data in done.files.items()}, real_path(out): text.encode()})
+            files = {folder / name: data for name, data in done.files.items()}
+            written = save_all({**files, real_path(out): text.encode()}, [folder])
     except (AdfError, SaveError) as error:
         console.print(str(error), style="red", markup=False)
         return 1
@@ -133,7 +136,7 @@ def _mjcf(source: Path) -> Converted:
 def _files(converted: Converted, out: Path, namespace: str) -> dict[Path, bytes]:
     files: dict[Path, bytes] = {}
     for name, mesh in converted.parts.meshes.items():
-        target = out.parent / ("low_res" if name.endswith("_collision.OBJ") else "high_res") / name
+        target = out.parent / ("low_res" if name.endswith(COLLIDING) else "high_res") / name
         surfaces = [
             Surface(
                 Paint(part.name, diffuse=part.material.diffuse if part.material else (0.8, 0.8, 0.8)),

@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 
 from ligature.adf import AdfError, Resolver
-from ligature.authoring.save import SaveError, save_all
+from ligature.authoring.save import SaveError, refuse_input, save_all
 from ligature.cli.numbers import counted
 from ligature.mesh import load_mesh
 from ligature.mesh.decompose import decompose as cut
@@ -21,6 +21,7 @@ def decompose(mesh: Path, out: Path | None, threshold: float, max_hulls: int, co
     target = out or mesh.with_name(f"{mesh.stem}_collision.obj")
     library = target.parent / f"{target.stem}.mtl"
     try:
+        refuse_input(target, mesh)
         result = cut(load_mesh(real_path(mesh), Resolver([real_path(mesh).parent])), threshold, max_hulls)
         text, materials = obj_text(result.hulls, library.name)
         with signals_held():

@@ -12,7 +12,7 @@ from rich.console import Console
 
 import ligature
 from ligature.adf import AdfError
-from ligature.authoring.save import SaveError, save_all
+from ligature.authoring.save import SaveError, refuse_input, save_all
 from ligature.cli.numbers import counted
 from ligature.process import signals_held
 
@@ -35,7 +35,11 @@ def poses(
     qw in the world.
     """
     try:
+        refuse_input(out, file)
         scene = ligature.load(file, models=models, roots=roots)
+    except SaveError as error:
+        console.print(str(error), style="red", markup=False)
+        return 1
     except AdfError as error:
         for diagnostic in error.diagnostics:
             console.print(str(diagnostic), style="red", markup=False)

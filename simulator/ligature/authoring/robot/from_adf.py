@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import count
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from ligature.mesh.inertia import MassProperties, box_properties, mass_propertie
 from ligature.mesh.load import load_mesh
 from ligature.mesh.mesh import MeshPart
 from ligature.mesh.surface import joined
+from ligature.paths import as_file_name
 
 MESHES = "meshes"
 """Folder of the mesh files, beside the robot's file."""
@@ -66,7 +68,7 @@ class _Exporter:
         names = unique([body.text("name") or body.key for body in self.bodies])
         self.names = {body.key: own for body, own in zip(self.bodies, names, strict=True)}
         self.inertial = {body.key: matrix_of(body.pose("inertial offset")) for body in self.bodies}
-        self.counts: dict[str, int] = {}
+        self.names_of_files: set[str] = set()
         self.meshes: dict[str, tuple[MeshPart, ...]] = {}
         """Parts of the meshes that are written, by name."""
 
@@ -210,8 +212,10 @@ class _Exporter:
             yield self._write(f"{stem}_collision", group)
 
     def _write(self, stem: str, parts: list[MeshPart]) -> MeshFile:
-        number = self.counts[stem] = self.counts.get(stem, 0) + 1
-        name = stem.replace("/", "_") + (f"_{number}" if number > 1 else "")
+        plain = as_file_name(stem)
+        numbered = (f"{plain}{f'_{number}' if number > 1 else ''}" for number in count(1))
+        name = next(name for name in numbered if name not in self.names_of_files)
+        self.names_of_files.add(name)
         surfaces = [
             Surface(
                 Paint(part.name, part.material.diffuse if part.material else (0.8, 0.8, 0.8)), part.vertices, part.faces
