@@ -174,11 +174,12 @@ def test_what_no_dataset_can_have_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_exists_is_not_replaced(simulation: ligature.Simulation, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", [str, Path])
+def test_what_exists_is_not_replaced(simulation: ligature.Simulation, tmp_path: Path, kind: type) -> None:
     path = tmp_path / "a.h5"
     path.write_text("mine")
     with pytest.raises(DatasetError, match="exists already; choose another name"):
-        DatasetWriter(path, simulation)
+        DatasetWriter(kind(path), simulation)
     assert path.read_text() == "mine"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from html.parser import HTMLParser
 from pathlib import Path
@@ -12,10 +13,13 @@ import onnx
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ligature.cli.evaluate import evaluate
 from ligature.cli.main import app
 from ligature.environments import SuturingEnv
 from ligature.environments.evaluation import Episode, run_episode, run_episodes, summary
 from ligature.environments.policies import PolicyError, checked, load_policy
+from ligature.render import RenderUnavailable
+from rich.console import Console
 from typer.testing import CliRunner
 
 TIP, TARGET, NUMBERS = 27, 30, 52
@@ -188,6 +192,41 @@ def test_the_command_writes_what_it_prints(network: Path, tmp_path: Path) -> Non
     page.feed((out / "index.html").read_text())
     assert page.open == ["!doctype"] or page.open == []
     assert len(page.pictures) == 6 and all((out / name).stat().st_size > 1000 for name in page.pictures)
+
+
+def test_without_opengl_or_a_disk_for_the_output_the_figures_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unavailable(self: SuturingEnv) -> None:
+        raise RenderUnavailable("no OpenGL here")
+
+    monkeypatch.setattr(SuturingEnv, "render", unavailable)
+    out, still = tmp_path / "out", tmp_path / "no UTF-8 \udcff.py"
+    still.write_text("policy = lambda env, seed: lambda seen: [0.0] * 7")
+    words = ["evaluate", f"{still}:policy", "--env", "reach", "--episodes", "1", "--max-steps", "1", "--out", str(out)]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0 and "the page has no pictures: no OpenGL here" in done.output, done.output
+    assert json.loads((out / "evaluation.json").read_text())["summary"]["episodes"] == 1
+    assert "<img" not in (out / "index.html").read_text()
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("ligature.cli.evaluate._print", full)
+    with pytest.raises(OSError, match="No space left"):
+        evaluate("random", {"task": "reach"}, range(1), 1, tmp_path / "full", 0, 1, Console(quiet=True))
+    assert json.loads((tmp_path / "full" / "evaluation.json").read_text())["episodes"]
+
+
+def test_a_folder_that_cannot_be_written_is_reported_before_anything_is_simulated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ligature.cli.evaluate.run_episodes", lambda *_: pytest.fail("it simulates"))
+    (tmp_path / "file").touch()
+    for out in ("file", "file/below", "/proc/found"):
+        with pytest.raises(OSError) as error:
+            evaluate("random", {"task": "reach"}, range(1), 1, tmp_path / out, 0, 1, Console(quiet=True))
+        assert str(tmp_path / out) == error.value.filename
 
 
 @pytest.mark.parametrize(

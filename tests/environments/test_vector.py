@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ligature.environments import SuturingEnv, SuturingVectorEnv, make_vec
 
-from tests.waiting import until
+from tests.waiting import stays, until
 
 N, STEPS = 2, 6
 
@@ -150,6 +150,20 @@ def test_no_worker_outlives_who_made_it_however_that_ends() -> None:
     assert maker.stdout is not None
     pids = [int(text) for text in maker.stdout.readline().split()]
     assert len(pids) == N and not any(gone(pid) for pid in pids)
+    maker.kill()
+    maker.wait()
+    maker.stdout.close()
+    until(lambda: all(gone(pid) for pid in pids), "the workers end")
+
+
+def test_a_server_that_forks_starts_them_too() -> None:
+    """Their parent is the server then, which lives on when their maker ends: the default from Python 3.14 on."""
+    one = MAKER.replace('"reach", 2', '"reach", 1')
+    code = f"import multiprocessing; multiprocessing.set_start_method('forkserver')\n{one}"
+    maker = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, encoding="utf-8")
+    assert maker.stdout is not None
+    pids = [int(text) for text in maker.stdout.readline().split()]
+    stays(lambda: len(pids) == 1 and not any(gone(pid) for pid in pids), "the workers work", 1.0)
     maker.kill()
     maker.wait()
     maker.stdout.close()

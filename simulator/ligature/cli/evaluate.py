@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from ligature.environments import SuturingEnv
 from ligature.environments.evaluation import MEASURES, UNITS, Episode, report, run_episode, run_episodes
 from ligature.environments.goals import GOALS, Goal
 from ligature.environments.policies import PolicyError, load_policy
+from ligature.paths import check_folder
+from ligature.render import RenderUnavailable
 from ligature.render.files import write_json, write_png
 
 EVERY = 10.0
@@ -36,20 +39,33 @@ def evaluate(
     """Run the episodes, print the summary, write JSON and page below ``out``; returns the exit status."""
     try:
         steps = max_steps or GOALS.get(options["task"], Goal).steps
-        load_policy(policy)  # what is wrong with it is said before anything is simulated
+        load_policy(policy)  # what is wrong with it is reported before anything is simulated, as what is with `out`
+        if out is not None:
+            check_folder(out)
         with ending_in_order():
             episodes = _run(policy, options, seeds, steps, jobs, console)
         found = report(policy, options, episodes, __version__)
+        files = [] if out is None else [write_json(found, out / "evaluation.json")]  # first of all: hours may be in it
         _print(found["summary"], console)
         if out is not None:
-            out.mkdir(parents=True, exist_ok=True)
-            shown = _pictures(policy, options, episodes[:pictures], steps, out)
-            files = [write_json(found, out / "evaluation.json"), write_page(found, shown, out / "index.html")]
+            shown = _drawn(policy, options, episodes[:pictures], steps, out, console)
+            files.append(write_page(found, shown, out / "index.html"))
             console.print("\n".join(map(str, files)), markup=False)
-    except (PolicyError, ValueError) as error:
+    except (PolicyError, ValueError, RenderUnavailable, BrokenExecutor) as error:
         console.print(str(error), style="red", markup=False)
         return 2
     return 0
+
+
+def _drawn(
+    policy: str, options: Mapping[str, Any], episodes: list[Episode], max_steps: int, out: Path, console: Console
+) -> list[tuple[int, list[Path]]]:
+    """Pictures of episodes; none, and a line with the reason, on a machine that cannot draw."""
+    try:
+        return _pictures(policy, options, episodes, max_steps, out)
+    except RenderUnavailable as error:
+        console.print(f"the page has no pictures: {error}", style="yellow", markup=False)
+        return []
 
 
 def _run(
@@ -62,18 +78,20 @@ def _run(
         now = time.perf_counter()
         if now - reported > EVERY or len(episodes) == len(seeds):
             reported, done = now, sum(e.success for e in episodes)
-            console.print(f"{len(episodes)} of {len(seeds)} episodes, {done} succeeded, {now - begin:.0f} s")
+            console.print(
+                f"{len(episodes)} of {len(seeds)} episodes, {done} succeeded, {now - begin:.0f} s", markup=False
+            )
     return episodes
 
 
 def _print(summary: Mapping[str, Any], console: Console) -> None:
     for name in ("success", "lost"):
         share = summary[name]
-        console.print(f"{name}: {share['mean']:.1%} ({share['low']:.1%} to {share['high']:.1%})")
+        console.print(f"{name}: {share['mean']:.1%} ({share['low']:.1%} to {share['high']:.1%})", markup=False)
     for name in (*MEASURES, "time_to_success"):
         if summary[name] is not None:
             mean, low, high = (summary[name][part] for part in ("mean", "low", "high"))
-            console.print(f"{name}: {mean:.3g} ({low:.3g} to {high:.3g}) {UNITS[name]}".rstrip())
+            console.print(f"{name}: {mean:.3g} ({low:.3g} to {high:.3g}) {UNITS[name]}".rstrip(), markup=False)
 
 
 class _Moments:

@@ -37,7 +37,7 @@ def write_page(report: Mapping[str, Any], pictures: Sequence[tuple[int, Sequence
         _episodes(report["episodes"]), "</body></html>",
     ]  # fmt: skip
     with staged(path) as part:
-        part.write_text("\n".join(text), "utf-8")
+        part.write_text("\n".join(text), "utf-8", errors="backslashreplace")  # names of files need not be UTF-8
     return path
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 import ligature
+from ligature.paths import as_file_name, check_folder
 from ligature.render import Frame, ImageSensor, RenderUnavailable
 from ligature.render.annotations import coco, mask_image
 from ligature.render.files import write_calibration, write_frame, write_json, write_png
@@ -41,11 +42,12 @@ def render(
         scene = ligature.load(launch, models, roots=roots)
         simulation = ligature.Simulation(scene)
         handle = simulation.cameras[camera]
+        check_folder(out)
         own = handle.camera.resolution
         size = resolution[0] or own[0], resolution[1] or own[1]
         simulation.step(max(1, round(seconds / simulation.dt)))
         frame = handle.capture(size, passes=PASSES, sensor=sensor)
-        name = handle.camera.identity.name
+        name = as_file_name(handle.camera.identity.name)
         files = write_frame(frame, out, name, format)
         calibration = handle.calibration(size, sensor=sensor)
         files.append(write_calibration(calibration, handle.pose, out / f"{name}_camera.json"))

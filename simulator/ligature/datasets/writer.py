@@ -75,7 +75,7 @@ class DatasetWriter:
 
     def __init__(
         self,
-        path: Path,
+        path: str | Path,
         simulation: Simulation,
         cameras: Sequence[str] = ("cameraL", "cameraR"),
         size: tuple[int, int] = (320, 240),
@@ -86,6 +86,7 @@ class DatasetWriter:
         remarks: Mapping[str, float | int | str] | None = None,
     ) -> None:
         _check(rate, size, phases, gestures or {})
+        path = Path(path)
         self._path, self._simulation = path, simulation
         self._size, self._rate, self._period = size, rate, 1.0 / rate
         self._cameras = {name: simulation.cameras[name] for name in cameras}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import threading
@@ -43,7 +44,8 @@ class _Made:
 
     def _end_with_parent(self) -> None:
         """End this process once its parent has: workers hold each other's pipes open, so that none notices."""
-        while os.getppid() == self.parent:
+        forked_by_server, maker = os.getppid() != self.parent, multiprocessing.parent_process()
+        while os.getppid() == self.parent or (forked_by_server and maker is not None and maker.is_alive()):
             time.sleep(PARENT_NAP)
         os._exit(0)
 
