@@ -234,6 +234,36 @@ def test_code_of_versions_that_nobody_starts_any_more_goes(program: str, tmp_pat
     assert "fedcba9876543210" not in {path.name for path in folder.iterdir()}
 
 
+DAMAGED = """
+import importlib, os, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import doubling
+from ligature import kernel_cache
+folder = kernel_cache.kernel_folder(Path(doubling.__file__), "doubling")
+for ending in ("nbi", "nbc"):
+    for damage in (lambda data: b"", lambda data: data[: len(data) // 2], lambda data: bytes(len(data)), None):
+        for path in folder.glob("*." + ending):
+            data = path.read_bytes()
+            path.unlink()
+            path.mkdir() if damage is None else path.write_bytes(damage(data))
+        importlib.reload(doubling)
+    importlib.reload(doubling)
+"""
+
+
+def test_files_that_a_power_failure_left_are_compiled_again(tmp_path: Path) -> None:
+    """Empty, cut, of zeros, or nothing that can be read or removed: another user's."""
+    (tmp_path / "doubling.py").write_text(PROGRAM)
+    environment = {**os.environ, "LIGATURE_CACHE": str(tmp_path / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", DAMAGED, str(tmp_path)], env=environment, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert [line.split()[0] for line in done.stdout.splitlines()] == ["42"] * 11
+    assert "cannot be read and is compiled again" in done.stderr
+
+
 def test_a_disk_that_becomes_full_costs_the_cache_and_not_the_run(program: str, tmp_path: Path) -> None:
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)); "
     done = run("import ligature.kernels; " + limit + program, LIGATURE_CACHE=str(tmp_path / "cache"))

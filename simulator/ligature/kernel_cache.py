@@ -171,12 +171,28 @@ class KernelCache(caching.FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The machine code for a signature; None where it is this process's turn to compile it."""
-        found = super().load_overload(sig, target_context)
+        found = self._loaded(sig, target_context)
         if found is None and self._turn is None and self._take_turn():
-            found = super().load_overload(sig, target_context)
+            found = self._loaded(sig, target_context)
             if found is not None:
                 self._end_turn()
         return found
+
+    def _loaded(self, sig: Any, target_context: Any) -> Any:
+        """The machine code for a signature, if it is kept; files that cannot be read are forgotten.
+
+        A power failure leaves files without content, another user's start files that are his.
+        """
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:  # whatever pickle and LLVM raise
+            index = Path(self._cache_file._index_path)
+            _log.warning("%s cannot be read and is compiled again: %s", index, str(error) or type(error).__name__)
+            try:
+                index.unlink()
+            except OSError:
+                self.disable()  # nothing can be kept there either
+            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled; what cannot be kept, for instance on a full disk, is logged."""
