@@ -13,7 +13,9 @@ else
 fi
 export ROS_PACKAGE_PATH="$_ligature/ros_msgs:$_ligature${ROS_PACKAGE_PATH:+:$ROS_PACKAGE_PATH}"
 export ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}"
-export ROS_IP="${ROS_IP:-127.0.0.1}"
+case "$ROS_MASTER_URI" in  # to a master elsewhere this machine is known by its name
+    http://127.*|http://localhost*) export ROS_IP="${ROS_IP:-127.0.0.1}" ;;
+esac
 export ROS_VERSION="${ROS_VERSION:-1}"
 unset _ligature _names
 unset -f _absent

@@ -14,6 +14,7 @@ from xmlrpc.client import ServerProxy
 
 import pytest
 from ligature.ros.registrations import NameTaken, claim, dead_neighbours, lives, registrations
+from ligature.ros.start import address_problem
 
 from tests.ros.conftest import BIN, SMALL, Program, free_port
 from tests.waiting import stays, until
@@ -122,6 +123,43 @@ def test_what_killed_nodes_left_is_removed_under_the_own_name_and_reported_under
     assert lives("/innocent") and not lives("/ligature")
     with pytest.raises(NameTaken, match="node /innocent at http"):
         claim("/innocent")
+
+
+NODE = """
+from ligature.ros.registrations import NameTaken
+from ligature.ros.start import start_node
+try:
+    start_node("ligature")
+except NameTaken as error:
+    raise SystemExit(f"taken: {error}")
+import rospy
+print("ready", rospy.get_name(), flush=True)
+rospy.spin()
+"""
+
+
+def test_a_namespace_of_the_environment_hides_no_simulator(env: dict[str, str], begin: Callable[..., Program]) -> None:
+    """ROS would have the second one end the first."""
+    words = ["env", "ROS_NAMESPACE=lab/left", sys.executable, "-c", NODE]
+    first = begin(*words)
+    first.wait_for("ready /ligature")
+    assert "ROS_NAMESPACE 'lab/left' has no effect" in first.output
+    second = begin(*words)
+    until(lambda: second.process.poll() is not None, "the second one ends", 20.0)
+    assert "taken: another simulator runs on this ROS master (node /ligature at" in second.output
+    stays(lambda: first.process.poll() is None, "the first one goes on", 0.5)
+
+
+@pytest.mark.parametrize(("host", "master", "why"), [
+    ("127.0.0.1", "localhost", ""), ("localhost", "127.0.0.1", ""), ("::1", "127.0.0.1", ""),
+    ("192.0.2.1", "127.0.0.1", "'192.0.2.1', which is not an address of this machine"),
+    ("no such host", "127.0.0.1", "'no such host', which is unknown to this machine"), ("..", "localhost", "is unknown"),
+    ("127.0.0.1", "192.0.2.1", "is known on this machine alone, but the ROS master is on 192.0.2.1"),
+])  # fmt: skip
+def test_an_address_that_others_may_not_reach_is_reported(host: str, master: str, why: str) -> None:
+    brackets = f"[{host}]" if ":" in host else host
+    problem = address_problem(f"http://{brackets}:40000/", f"http://{master}:11311")
+    assert why in problem and bool(problem) is bool(why), problem
 
 
 @pytest.mark.usefixtures("asked")

@@ -37,7 +37,7 @@ from ligature.ros.publisher import Publisher
 from ligature.ros.reception import Reception
 from ligature.ros.registrations import dead_neighbours
 from ligature.ros.schedule import Key, Outlet, Schedule
-from ligature.ros.start import start_node
+from ligature.ros.start import address_problem, start_node
 from ligature.ros.unserved import Unserved
 
 DEFAULT_LOW, DEFAULT_HIGH = 50, 1000
@@ -96,7 +96,7 @@ class Node:
     def run(self, stop: Stop, on_first: Callable[[], None]) -> None:
         """Publish until ``stop`` is set or the physics process is gone."""
         self._master.start()
-        threading.Thread(target=_report_dead_neighbours, name="dead neighbours", daemon=True).start()
+        threading.Thread(target=_report_unreachable, name="unreachable", daemon=True).start()
         published, ready, housekeeping = False, False, 0.0
         if self._block.read(self._state):
             self._arms.start(self._state[0])
@@ -217,8 +217,13 @@ class Node:
         return self._block.active
 
 
-def _report_dead_neighbours() -> None:
-    """Log which nodes that do not answer are registered for topics of this one; each may take seconds to find out."""
+def _report_unreachable() -> None:
+    """Log whether others may not reach this node, and which nodes that do not answer are registered for its topics.
+
+    Each may take seconds to find out.
+    """
+    if problem := address_problem(rospy.get_node_uri(), rosgraph.get_master_uri()):
+        rospy.logwarn(problem)
     manager = get_topic_manager()
     topics = [topic for topic, _ in (*manager.get_publications(), *manager.get_subscriptions())]
     with suppress(*NO_ANSWER):  # the watch of the master reports it

@@ -6,6 +6,12 @@ kernel drops those beyond the queue, and they are retried after 1, 3, 7, 15 seco
 
 from __future__ import annotations
 
+import ipaddress
+import os
+import socket
+from typing import Any
+from urllib.parse import urlparse
+
 import rospy
 import rospy.impl.tcpros_base as tcpros
 from rosgraph.xmlrpc import ThreadingXMLRPCServer
@@ -22,17 +28,60 @@ WAITING = 512
 def start_node(name: str, several: bool = False) -> None:
     """Make this process the node ``name``, which takes `WAITING` connections at once and no message of any length.
 
-    With ``several`` its name gets an ending of its own, so that many may run side by side. Signals stay the caller's.
+    With ``several`` its name gets an ending of its own, so that many may run side by side. The name is in no namespace.
+    Signals stay the caller's.
     Raises `ligature.ros.registrations.NameTaken`.
     """
+    rospy.names._set_caller_id("/unnamed")  # a namespace of ROS_NAMESPACE would hide this node from `claim` of others
     removed = "" if several else claim(f"/{name}")
     ThreadingXMLRPCServer.request_queue_size = WAITING
     bound_messages()
     give_up_publishers()
     rospy.init_node(name, anonymous=several, disable_signals=True)
+    namespace = os.environ.get("ROS_NAMESPACE", "").strip("/")
+    if namespace and not several:
+        rospy.logwarn(f"ROS_NAMESPACE '{namespace}' has no effect: topics are those of AMBF; --ns gives them a prefix")
     if removed:
         rospy.logwarn(removed)
     tcpros.start_tcpros_server()
     server = tcpros._tcpros_server.tcp_ros_server
     server.inbound_handler = apart(server.inbound_handler)
     server.server_sock.listen(WAITING)
+
+
+def address_problem(uri: str, master: str) -> str:
+    """Why programs elsewhere may not reach the node at ``uri`` of the ``master`` at another; empty where they may."""
+    host, other = (urlparse(address).hostname or "" for address in (uri, master))
+    places = _places(host)
+    alone = all(ipaddress.ip_address(place[0]).is_loopback for _, place in places)
+    if not places:
+        why = "is unknown to this machine"
+    elif not any(map(_is_here, places)):
+        why = "is not an address of this machine"
+    elif alone and not any(map(_is_here, _places(other))):
+        why = f"is known on this machine alone, but the ROS master is on {other}"
+    else:
+        return ""
+    return (
+        f"programs look for the topics at '{host}', which {why}: those that cannot reach it get no messages; "
+        "set ROS_IP to the address of this machine"
+    )
+
+
+def _places(host: str) -> list[tuple[int, Any]]:
+    """Families and socket addresses of a host; none for one that is unknown."""
+    try:
+        return [(family, place) for family, _, _, _, place in socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)]
+    except (OSError, UnicodeError):
+        return []
+
+
+def _is_here(where: tuple[int, Any]) -> bool:
+    """Whether a socket can be bound to the address, as to those of this machine alone."""
+    family, place = where
+    try:
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.bind(place)
+    except OSError:
+        return False
+    return True
