@@ -340,7 +340,10 @@ def perform(
     given: argparse.Namespace, suture: Callable[[ligature.Simulation, Film | None], tuple[Any, Measures, str]]
 ) -> int:
     """Load the scene, suture, print how it went, and keep the pictures; returns the exit status."""
-    simulation = ligature.Simulation(ligature.load(given.scene))
+    try:
+        simulation = ligature.Simulation(ligature.load(given.scene))
+    except ligature.SceneError as error:
+        sys.exit(str(error))
     scatter(simulation, given.seed)
     film = Film(simulation, given.out) if given.out else None
     started = time.perf_counter()

@@ -92,6 +92,32 @@ def test_indices_of_models_are_whole_numbers_in_any_container() -> None:
             ligature.load("peg_transfer", models=bad)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("what", ["files", "roots", "soft", "arms"])
+@pytest.mark.parametrize("one", ["/tmp", Path("/tmp"), b"/tmp"])
+def test_one_text_is_no_list(what: str, one: Any) -> None:
+    """Of ``roots="/tmp"`` the first letter is the whole disk."""
+    with pytest.raises(TypeError, match=f"{what} is .*; it must be a list, such as "):
+        ligature.load("peg_transfer", **{what: one})
+    if what == "roots":
+        with pytest.raises(TypeError, match="it must be a list"):
+            ligature.adf.Resolver(one)
+
+
+def test_what_is_no_path_no_arm_and_no_name_is_reported(scene: ligature.Scene) -> None:
+    for path in (5, None, b"suturing", ["suturing"]):
+        with pytest.raises(TypeError, match="it must be the path of a file, or the name of a scene"):
+            ligature.load(path)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="arms is .* it must be a list of mappings"):
+        ligature.load("peg_transfer", arms=["MTML=mtm"])  # type: ignore[list-item]
+    with ligature.Simulation(scene) as sim:
+        for name in (0, None, b"Needle", 1.5, ()):
+            for handles in (sim.bodies, sim.joints, sim.cameras):
+                assert name not in handles
+        for size in ("big", (10.5, 10), (1,), 5, (None, 1)):
+            with pytest.raises(TypeError, match="a size of pictures must be a width and a height"):
+                sim.cameras["eye"].view(size)  # type: ignore[arg-type]
+
+
 def test_what_is_no_scene_is_reported() -> None:
     for thing in ("suturing", None, Path("launch.yaml"), 3):
         with pytest.raises(TypeError, match="ligature.load"):

@@ -76,6 +76,7 @@ def _box(folder: Path, names: list[str], x: float = 0.0) -> Path:
         lambda s: s.step(),
         lambda s: s.reset(),
         lambda s: s.snapshot(),
+        lambda s: s.touched(0),
         lambda s: next(iter(s.bodies.values())).set_pose([0, 0, 0, 0, 0, 0, 1]),
         lambda s: next(iter(s.bodies.values())).release(),
     ],

@@ -74,6 +74,12 @@ def check_folder(folder: Path) -> None:
         tempfile.TemporaryFile(dir=folder).close()
 
 
+def check_list(what: str, given: object) -> None:
+    """Raise TypeError where one text or path is ``given`` for a list of them: each letter would be one, as ``/``."""
+    if isinstance(given, str | bytes | os.PathLike):
+        raise TypeError(f"{what} is {given!r}; it must be a list, such as [{given!r}]")
+
+
 def part_of(path: Path) -> Path:
     """What the recording ``path`` is called until it is whole; to be opened with the mode ``x``.
 

@@ -302,3 +302,13 @@ def test_every_file_of_the_corpus_loads_from_an_archive_as_it_does_from_a_reposi
             if "lies outside" in diagnostic.message:
                 named = Path(diagnostic.message.split("'")[1])
                 assert copy not in named.parents, str(diagnostic)
+
+
+@pytest.mark.parametrize(("name", "encoding"), [("\ud800.obj", "utf-8"), ("\u624b.obj", "ascii")])
+def test_a_name_that_the_system_cannot_encode_is_reported(
+    name: str, encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lone surrogate, which YAML can write, and a letter where the locale is ASCII."""
+    monkeypatch.setattr(os, "fsencode", lambda path: os.fspath(path).encode(encoding, "surrogateescape"))
+    with pytest.raises(ResolutionError, match="has letters that names of files cannot have"):
+        Resolver([tmp_path]).resolve(name, tmp_path)

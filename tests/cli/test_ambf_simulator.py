@@ -109,5 +109,5 @@ def test_a_missing_launch_file_flag_is_reported(capsys: pytest.CaptureFixture[st
 
 
 def test_options_travel_to_the_processes_unchanged() -> None:
-    run = options("-l 1,2 -a x.yaml -p 120 --ns /lab --root /data")
+    run = options("-l 1,2 -a x.yaml -p 120 --ns /lab --root /usr")
     assert RunOptions.from_text(run.to_text()) == run

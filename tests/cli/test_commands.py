@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from ligature.cli import ambf_simulator
+from ligature.cli.main import app
 from typer.testing import CliRunner
 
 BIN = Path(sys.executable).parent
@@ -68,6 +70,33 @@ def test_bench_prints_its_figures_as_json() -> None:
 def test_bench_of_a_bad_file_ends_with_two(tmp_path: Path) -> None:
     done = ligature("bench", tmp_path / "none.yaml")
     assert done.returncode == 2 and "does not exist" in " ".join(done.stdout.split())  # rich wraps long paths
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("check suturing --root none", "'none' does not exist"),
+        ("run suturing --root file", "'file' is a file"),
+        ("demo --episodes 3", "--episodes describes a dataset"),
+        ("replay run.record --page --dataset a.h5", "it must be without --dataset"),
+        ("replay run.record --joints measured", "a record is simulated as fast as possible"),
+        ("replay run.record -s 2", "a record is simulated as fast as possible"),
+    ],
+)
+def test_options_that_would_have_no_effect_are_reported(
+    words: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("file").touch()
+    Path("run.record").write_text('{"format": "ligature record 3"}')
+    done = CliRunner().invoke(app, words.split(), env={"COLUMNS": "200"})
+    assert done.exit_code in (1, 2) and message in " ".join(done.output.split()), done.output
+
+
+def test_ambf_simulator_names_a_root_that_is_missing(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        ambf_simulator.options_of(["--launch_file", "x", "--root", "none"])
+    assert "--root 'none' is not a folder" in capsys.readouterr().err
 
 
 def test_score_takes_the_former_name_of_its_timeout(tmp_path: Path) -> None:

@@ -44,6 +44,12 @@ def test_a_taken_port_is_reported() -> None:
             check_free(Address("127.0.0.1", other.getsockname()[1]))
 
 
+@pytest.mark.parametrize("host", ["..", "x" * 70, "no such host"])
+def test_what_is_no_host_is_reported(host: str) -> None:
+    with pytest.raises(AddressError, match="cannot serve the cockpit at .*; choose another ADDRESS:PORT"):
+        check_free(Address(host, 0))
+
+
 @pytest.mark.parametrize(
     "command", [["cockpit", "x.yaml", "--at", "0.0.0.0:8080"], ["run", "x.yaml", "--cockpit-at", "0.0.0.0:8080"]]
 )

@@ -431,6 +431,12 @@ def test_a_state_of_another_task_is_refused() -> None:
     pick.close()
 
 
+@pytest.mark.parametrize("state", [None, {}, "saved"])
+def test_what_is_no_state_is_refused(soft: SuturingEnv, state: object) -> None:
+    with pytest.raises(TypeError, match="restore what 'save' returned"):
+        soft.restore(state)  # type: ignore[arg-type]
+
+
 def test_options_of_reset_are_refused() -> None:
     env = SuturingEnv("reach")
     with pytest.raises(ValueError, match="reset takes no options, but got 'difficulty'"):
@@ -505,6 +511,9 @@ def test_an_action_is_its_numbers_whatever_their_type() -> None:
         ({"size": (0, 84)}, ValueError, "size is a width and a height in pixels"),
         ({"size": (84,)}, ValueError, "size is a width and a height in pixels"),
         ({"size": "84"}, ValueError, "size is a width and a height in pixels"),
+        ({"size": (84, 10**6)}, ValueError, "size is a width and a height in pixels, 1 to 16384 each"),
+        ({"arm": 5}, TypeError, "arm is 5; it must be the name of an arm, or a list of names"),
+        ({"observation": "image", "camera": None}, KeyError, "'None' does not name exactly one camera"),
         ({"max_steps": 0}, ValueError, "max_steps is a number of actions, at least 1"),
         ({"max_steps": 1.5}, ValueError, "max_steps is a number of actions, at least 1"),
         ({"render_mode": "human"}, ValueError, "render_mode must be None or rgb_array"),

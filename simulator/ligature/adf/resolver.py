@@ -9,6 +9,7 @@ from __future__ import annotations
 import codecs
 import os
 import re
+import sys
 from collections import abc
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,7 +17,7 @@ from pathlib import Path
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 from ligature.adf.lacking import instead_of_url, lack_of
 from ligature.adf.nodes import Node, Scalar, Sequence, parse
-from ligature.paths import open_file, real_path
+from ligature.paths import check_list, open_file, real_path
 
 MAX_BYTES = 256 * 1024 * 1024
 """Largest file that is read unless the caller sets otherwise."""
@@ -59,6 +60,7 @@ class Resolver:
     """
 
     def __init__(self, roots: abc.Sequence[Path]) -> None:
+        check_list("roots", roots)
         self.roots = tuple(real_path(Path(root)) for root in roots)
 
     @classmethod
@@ -67,6 +69,7 @@ class Resolver:
 
         Its root is that of `scene_root`; ``extra_roots`` and the folders of ``LIGATURE_SCENE_PATH`` are added.
         """
+        check_list("roots", extra_roots)
         listed = os.environ.get(SEARCH_PATH, "")
         more = [Path(item) for item in listed.split(os.pathsep) if item]
         return cls([scene_root(Path(path)), *extra_roots, *more])
@@ -100,6 +103,13 @@ class Resolver:
             raise self._refusal("the path contains a zero byte", mark, "write the path without it")
         if len(str(path)) > MAX_PATH or any(len(part.encode("utf-8", "replace")) > MAX_NAME for part in path.parts):
             raise self._refusal(f"the path '{str(path)[:60]}…' is too long for a file", mark, "give a shorter one")
+        try:
+            os.fsencode(path)
+        except UnicodeEncodeError:
+            raise self._refusal(
+                f"{ascii(str(path))} has letters that names of files cannot have in the encoding "
+                f"'{sys.getfilesystemencoding()}'", mark, "use others, or set LC_ALL=C.UTF-8",
+            ) from None  # fmt: skip
         real = real_path(path)
         if not self._covers(real):
             roots = ", ".join(map(str, self.roots))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 from ligature.cli.numbers import LARGEST
 from ligature.cli.options import RunOptions, arm_entry, arm_names, model_indices, name_prefix, rate_notes
@@ -104,6 +105,9 @@ def options_of(arguments: list[str]) -> RunOptions:
         name_prefix(given.ns)
     except ValueError as error:
         flags.error(f"--ns {error}")
+    for root in given.root:
+        if not Path(root).is_dir():
+            flags.error(f"--root '{root}' is not a folder; give one that exists")
     if not given.p >= 1 or not 0 < given.s <= LARGEST:
         flags.error(f"-p must be at least 1 update per second, and -s larger than 0, not {given.p:g} and {given.s:g}")
     for name in ("override_min_comm_freq", "override_max_comm_freq"):

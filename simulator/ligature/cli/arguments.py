@@ -29,7 +29,8 @@ Launch = Annotated[
 ]
 Models = Annotated[Optional[str], typer.Option("-l", help="Indices of 'multibody configs', for example 10,11,6.")]  # noqa: UP045
 Roots = Annotated[
-    list[Path] | None, typer.Option("--root", help="Additional folder that scene files may be read from.")
+    list[Path] | None,
+    typer.Option("--root", help="Additional folder that scene files may be read from.", exists=True, file_okay=False),
 ]  # noqa: UP045
 
 UpdateRate = Annotated[float, typer.Option("-p", help="Updates per simulated second.", min=1, max=1000)]

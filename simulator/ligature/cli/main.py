@@ -208,7 +208,7 @@ def render(
     height: Annotated[int, typer.Option(help="Height in pixels; 0 for the camera's own.", min=0)] = 0,
     root: Roots = None,
     format: Annotated[str, typer.Option(help="Format of depth, ids and normals: npy, png or exr.")] = "npy",
-    annotations: Annotated[str, typer.Option(help="Annotations to write: coco, mask or both.")] = "",
+    annotations: Annotated[str, typer.Option(help="Annotations to write: coco, mask, or coco,mask.")] = "",
     exposure: Annotated[float, typer.Option(help="Exposure compensation in stops.")] = 0.0,
     noise: Annotated[float, typer.Option(help="Standard deviation of colour noise; 1 is full scale.", min=0)] = 0.0,
     depth_noise: Annotated[float, typer.Option(help="Standard deviation of depth noise in metres.", min=0)] = 0.0,
@@ -329,6 +329,8 @@ def demo(
     """Let two arms suture autonomously; prints the score, writes pictures."""
     from ligature.cli.demo import demo as run_demo
 
+    if episodes != 1 and dataset is None:
+        raise typer.BadParameter("--episodes describes a dataset; add '--dataset FILE.h5'")
     sampling, console = sampling_of(dataset, rate, size, camera), Console(highlight=False, soft_wrap=True)
     raise typer.Exit(run_demo(throws, seed, out, dataset, console, episodes, sampling, tissue))
 
@@ -420,6 +422,8 @@ def replay(
 ) -> None:
     """Simulate a recorded run again bit for bit, or play a bag into the running simulator."""
     if page or compare is not None:
+        if dataset is not None or joints or task or text or success is not None:
+            raise typer.BadParameter("--page shows records: it must be without --dataset, --joints, --task, --text")
         address = page_address(at)
         from ligature.cli.replay_page import show
 

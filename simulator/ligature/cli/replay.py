@@ -30,6 +30,8 @@ def replay(
     """Replay ``file``, or write it into ``dataset``; the exit status is 1 when a run did not repeat bit for bit."""
     try:
         if is_record(file):
+            if joints or speed != 1.0:
+                raise ValueError("--joints and -s play bags; leave them out: a record is simulated as fast as possible")
             return _again(Record.read(file), scene, dataset, console, allow_plugins)
         if dataset is not None:
             return _sampled_bag(file, scene, dataset, console)

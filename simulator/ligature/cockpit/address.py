@@ -70,5 +70,8 @@ def check_free(address: Address) -> None:
         with socket.socket(family, kind, protocol) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(place)
-    except OSError as error:
-        raise AddressError(f"cannot serve the cockpit at {address.host}:{address.port}: {error.strerror}") from error
+    except (OSError, UnicodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "not the name of a machine"
+        raise AddressError(
+            f"cannot serve the cockpit at {address.host}:{address.port}: {why}; choose another ADDRESS:PORT"
+        ) from error

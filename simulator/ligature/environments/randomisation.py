@@ -16,7 +16,7 @@ import numpy as np
 import yaml
 
 from ligature.model.scene import Scene
-from ligature.paths import open_file
+from ligature.paths import open_file, reason
 
 MOST_BYTES, MOST_LEVELS = 1 << 16, 3
 """Of a file of ranges."""
@@ -265,7 +265,8 @@ def _read(path: Path) -> Any:
         _check_flat(text)
         found = yaml.safe_load(text)
     except (OSError, ValueError, yaml.YAMLError) as error:
-        raise ValueError(f"randomise: {path} cannot be read: {' '.join(str(error).split())}") from error
+        why = reason(error) if isinstance(error, OSError) else " ".join(str(error).split())
+        raise ValueError(f"randomise: {path} cannot be read: {why}") from error
     if not isinstance(found, Mapping):
         raise ValueError(f"randomise: {path} must hold ranges by name, such as 'mass: [0.8, 1.2]'")
     return found

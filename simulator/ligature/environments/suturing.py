@@ -39,6 +39,9 @@ CONTROL = 0.02
 
 SUCCESS_REWARD = 1.0
 
+MOST_PIXELS = 16384
+"""Of a side of a picture."""
+
 TRIES = 20
 """How often an episode is drawn anew whose start cannot be simulated, such as one with a needle too smooth to hold."""
 
@@ -162,9 +165,9 @@ driven, and taken by the second arm (``suture``) | |
         if (
             len(np.shape(size)) != 1
             or len(size) != 2
-            or not all(isinstance(n, int | np.integer) and n > 0 for n in size)
+            or not all(isinstance(n, int | np.integer) and 0 < n <= MOST_PIXELS for n in size)
         ):
-            raise ValueError(f"size is a width and a height in pixels, at least 1 each, not {size!r}")
+            raise ValueError(f"size is a width and a height in pixels, 1 to {MOST_PIXELS} each, not {size!r}")
         if max_steps is not None and (not isinstance(max_steps, int | np.integer) or max_steps < 1):
             raise ValueError(f"max_steps is a number of actions, at least 1, or None for no end, not {max_steps!r}")
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -407,9 +410,11 @@ driven, and taken by the second arm (``suture``) | |
     def restore(self, state: EnvState) -> Any:
         """Go on from where `save` was called; returns the observation there.
 
-        Raises ValueError for a state of another task, scene, arm or randomisation.
+        Raises ValueError for a state of another task, scene, arm or randomisation, and TypeError for anything else.
         """
         self._check_open()
+        if not isinstance(state, EnvState):
+            raise TypeError(f"a {type(state).__name__} is not a state of an environment; restore what 'save' returned")
         for name in ("task", "scene", "arm", "randomise"):
             if state.options[name] != self._options[name]:
                 raise ValueError(f"the state has {name}={state.options[name]!r}, not {self._options[name]!r}")
@@ -510,6 +515,8 @@ _STARTS: WeakKeyDictionary[Scene, dict[tuple[type[Goal], tuple[str, ...], int], 
 def _arms(task: str, given: str | Sequence[str] | None) -> tuple[str, ...]:
     """Names of the arms that act; ValueError where the task needs more or fewer."""
     own = GOALS[task].arms
+    if not isinstance(given, str | Sequence | None):
+        raise TypeError(f"arm is {given!r}; it must be the name of an arm, or a list of names")
     names = own if given is None else (given,) if isinstance(given, str) else tuple(given)
     if len(names) != len(own) or len(set(names)) != len(names):
         wanted = f"{len(own)} arm{'s' * (len(own) > 1)}, such as {', '.join(own)}"

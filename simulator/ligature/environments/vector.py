@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
+import numpy as np
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode
 from gymnasium.vector.async_vector_env import AsyncState
 
@@ -60,7 +61,7 @@ class SuturingVectorEnv(AsyncVectorEnv):
     """
 
     def __init__(self, task: str, n: int, autoreset: str = "next step", **options: Any) -> None:
-        if n < 1:
+        if not isinstance(n, int | np.integer) or n < 1:
             raise ValueError(f"n is a number of environments, at least 1, not {n}")
         if autoreset not in AUTORESET:
             raise ValueError(f"autoreset must be one of {', '.join(map(repr, AUTORESET))}, not {autoreset!r}")

@@ -51,6 +51,8 @@ class Handles(Mapping[str, Handle], Generic[Handle]):
         self._handles = list(handles)
 
     def __getitem__(self, text: str) -> Handle:
+        if not isinstance(text, str):
+            raise UnknownNameError(self._unknown(repr(text)))
         for names in self._names:
             if text in names:
                 return self._handles[names.index(text)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from ligature.model.naming import prefixed
 from ligature.model.plugins import plugin_entries
 from ligature.model.scene import Scene
 from ligature.model.softening import soften
+from ligature.paths import check_list
 
 
 class SceneError(AdfError):
@@ -66,10 +68,17 @@ def load(
     SceneError
         When there is nothing to run: the file is not readable, or no body could be created.
     TypeError
-        For ``models`` or ``devices`` that are no list of whole numbers.
+        For a ``path`` that is none, for ``models`` or ``devices`` that are no list of whole numbers, and for one text
+        or path where a list of them is needed: each of its letters would count.
     ValueError
         For a material of ``soft`` that does not exist.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(f"path is {path!r}; it must be the path of a file, or the name of a scene such as 'suturing'")
+    for what, given in (("files", files), ("roots", roots), ("soft", soft), ("arms", arms or ())):
+        check_list(what, given)
+    if not all(isinstance(arm, Mapping) for arm in arms or ()):
+        raise TypeError(f"arms is {arms!r}; it must be a list of mappings, such as [{{'name': 'MTML', 'kind': 'mtm'}}]")
     start = launch_file(Path(path))
     models, devices = indices("models", models), indices("devices", devices) or ()
     resolver = Resolver.for_file(start, [Path(root) for root in (*roots, *(Path(f).parent for f in files))])

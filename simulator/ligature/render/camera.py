@@ -7,6 +7,7 @@ Metres and radians.
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,9 +122,12 @@ def projection_matrix(camera: Camera, width: int, height: int, eye: str = "") ->
 def view_of(camera: Camera, pose: Array, resolution: tuple[int, int] | None = None, eye: str = "") -> CameraView:
     """The view of ``camera``, or of its eye ``"left"`` or ``"right"``, standing at ``pose`` (7,) in world axes.
 
-    Raises ValueError for a ``resolution`` without pixels.
+    Raises ValueError for a ``resolution`` without pixels, TypeError for what is none.
     """
-    width, height = resolution or camera.resolution
+    try:
+        width, height = map(operator.index, resolution or camera.resolution)
+    except (TypeError, ValueError):
+        raise TypeError(f"a size of pictures must be a width and a height in pixels, not {resolution!r}") from None
     if width < 1 or height < 1:
         raise ValueError(f"a picture cannot be {width} x {height}: each is at least 1 pixel")
     return CameraView(

@@ -181,6 +181,7 @@ class Simulation:
 
     def touched(self, body: int) -> frozenset[int]:
         """Rigid bodies that ``body`` touches, as after the last tick."""
+        self._check_open()
         return frozenset(contact.body for contact in self._world.queries.contacts(body, 0.0))
 
     # --- commands ---------------------------------------------------------------------------
