@@ -67,6 +67,11 @@ def naming(path: Path) -> Iterator[None]:
         raise OSError(error.errno, reason(error), str(path)) from error
 
 
+def printable(text: object) -> str:
+    """``text`` with escapes for the surrogates of names that are not UTF-8, which nothing but a path may hold."""
+    return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def check_folder(folder: Path) -> None:
     """Create a folder where it is missing, and write to it; raises OSError, before anything is computed for it."""
     folder.mkdir(parents=True, exist_ok=True)

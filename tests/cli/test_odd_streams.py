@@ -113,3 +113,18 @@ def test_a_deleted_working_folder_is_reported_in_words(words: list[str], folder:
     )  # fmt: skip
     assert done.returncode in (1, 2), done.stdout + done.stderr
     assert (done.stdout + done.stderr).strip() and "Traceback" not in done.stdout + done.stderr
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can become a user that the system does not know")
+def test_a_user_without_a_home_gets_no_folder_that_is_called_so(folder: Path) -> None:
+    """ROS logs below ``~``, which is then taken as it stands; every program of a command has the variable instead."""
+    folder.chmod(0o777)
+    code = "import os; from ligature.cli import command; command._have_logs_of_ros(); print(os.environ['ROS_LOG_DIR'])"
+    known = {name: os.environ[name] for name in ("PATH", "PYTHONPATH") if name in os.environ}
+    words = ["setpriv", "--reuid=54321", "--clear-groups", sys.executable, "-c", code]
+    done = subprocess.run(
+        words, cwd="/", env={**known, "TMPDIR": str(folder)}, capture_output=True, text=True, timeout=60
+    )
+    if "ModuleNotFoundError" in done.stderr or "PermissionError" in done.stderr:
+        pytest.skip("a stranger cannot read this checkout or the folder of the tests")
+    assert done.returncode == 0 and Path(done.stdout.strip()).is_absolute(), done.stderr

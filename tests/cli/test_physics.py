@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ligature import Simulation, load
+from ligature.adf import Diagnostic, Mark, Severity
 from ligature.bus import Block, Mailbox, Throttle
 from ligature.bus.codec import Message, encode
 from ligature.cli.options import RunOptions
@@ -67,6 +68,16 @@ def run(tmp_path: Path) -> Iterator[Run]:
 
 def test_updates_keep_pace_with_the_wall_clock(run: Run) -> None:
     assert run.turn_for(0.5) == pytest.approx(100, abs=15)
+
+
+def test_an_alarm_of_a_file_whose_name_is_no_utf_8_ends_no_run(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    place = Mark(Path("no UTF-8 \udcff", "model.yaml"), 1, 1)
+    run.simulation.problems.append(Diagnostic(Severity.WARNING, "too fast", place, code="speed"))
+    run.loop._mark -= 2.0
+    run.loop._figures()
+    assert b"no UTF-8 \\udcff/model.yaml:1:1: warning: too fast" in run.block.figures["alarm"][0]
+    assert b"too fast" in run.block.figures["findings"]["text"].tobytes()
+    assert "too fast" in capsys.readouterr().out
 
 
 def test_a_client_that_repeats_an_idle_world_command_changes_no_pace(run: Run) -> None:

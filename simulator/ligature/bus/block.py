@@ -24,6 +24,7 @@ from ligature.bus.leftovers import FOLDER
 from ligature.bus.ring import RING_BYTES, Ring
 from ligature.deprecation import warn_deprecated
 from ligature.model.state import StateDtype, StateRecord
+from ligature.paths import printable
 
 PRODUCERS = ("ros", "cockpit", "teleop", "window", "spare")
 MAGIC = 0x4C494741
@@ -218,7 +219,7 @@ class Block:
     def note(self, severity: int, text: str) -> None:
         """Keep the finding ``text`` of ``severity`` for `/diagnostics`, in place of the same one or of the oldest."""
         findings = self.figures["findings"][0]
-        words = text.encode("utf-8")[: findings.dtype["text"].itemsize]
+        words = printable(text).encode("utf-8")[: findings.dtype["text"].itemsize]
         same = np.flatnonzero(findings["text"] == words)
         place = int(same[0]) if len(same) else int(np.argmin(findings["time"]))
         findings["text"][place], findings["severity"][place] = words, severity

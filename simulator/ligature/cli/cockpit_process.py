@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ligature.cli.process import Run, run_process
 from ligature.cockpit.address import TOKEN_VARIABLE, AddressError, read_address
 from ligature.cockpit.pictures import Pictures
-from ligature.paths import real_path
+from ligature.paths import printable, real_path
 from ligature.process import report
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def _serve(run: Run) -> None:
             scene, run.block, pictures, address, os.environ.get(TOKEN_VARIABLE, ""),
             lambda text: report("warning", text),
             _on_ros(options.prefix) if options.ros else None,
-            f"{real_path(Path(options.scene)).parent.name}/{Path(options.scene).stem}", options.task,
+            printable(f"{real_path(Path(options.scene)).parent.name}/{Path(options.scene).stem}"), options.task,
         )  # fmt: skip
     except AddressError as error:
         run.fail(error)

@@ -17,7 +17,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import NoReturn
 
@@ -52,6 +52,7 @@ def ambf_simulator() -> None:
 
 def _run(module: str) -> None:
     _open_streams()
+    _have_logs_of_ros()
     take_interrupts()
     try:
         try:
@@ -172,6 +173,16 @@ def _open_streams() -> None:
             setattr(sys, name, open(number, "w" if number else "r", encoding="utf-8", closefd=False))  # noqa: SIM115
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as errors: a terminal without UTF-8 lacks '³' and names
+
+
+def _have_logs_of_ros() -> None:
+    """Give the logs of ROS a place for a user without a home folder: ROS makes one called ``~`` where one is."""
+    if os.path.isabs(os.path.expanduser("~")) or os.environ.get("ROS_HOME") or os.environ.get("ROS_LOG_DIR"):
+        return
+    from ligature.cache import CacheError, cache_folder
+
+    with suppress(CacheError):
+        os.environ["ROS_LOG_DIR"] = str(cache_folder() / "ros")
 
 
 def open_null(number: int) -> None:

@@ -20,6 +20,7 @@ from ligature.cli.process import Run, run_process
 from ligature.cli.recorder import Recorder
 from ligature.model.commands import Command, MarkPhase
 from ligature.model.messages import Message, handle
+from ligature.paths import printable
 from ligature.process import report
 from ligature.simulation import Simulation
 
@@ -184,7 +185,7 @@ class Loop:
         for problem in self._simulation.problems:
             if problem.code in ALARMS:
                 figures["alarms"] += 1
-                figures["alarm"] = str(problem).encode("utf-8")[:ALARM_BYTES]
+                figures["alarm"] = printable(problem).encode("utf-8")[:ALARM_BYTES]
         worst = sorted(self._simulation.problems, key=lambda problem: -problem.severity)
         for problem in reversed(worst[:MOST_NOTED]):
             self._block.note(problem.severity, str(problem))

@@ -14,7 +14,7 @@ from ligature.bus.stop import stop_on_signal
 from ligature.cli.resimulation import resimulate
 from ligature.cockpit.address import TOKEN_VARIABLE, read_address
 from ligature.cockpit.replay_page import Reel, ReplayPage
-from ligature.paths import reason
+from ligature.paths import printable, reason
 
 
 def show(files: list[Path], scene: Path | None, at: str, console: Console) -> int:
@@ -45,11 +45,11 @@ def show(files: list[Path], scene: Path | None, at: str, console: Console) -> in
 
 def _reels(files: list[Path], scene: Path | None, console: Console) -> list[Reel]:
     found = []
-    names = [file.stem for file in files]
+    names = [printable(file.stem) for file in files]
     for number, file in enumerate(files):
         if not is_record(file):
             raise ValueError(f"{file}: not a record of a run; a page needs one")
-        name = file.stem if names.count(file.stem) == 1 else f"{file.stem} ({number + 1})"
+        name = names[number] if names.count(names[number]) == 1 else f"{names[number]} ({number + 1})"
         reel: Reel | None = None
 
         def take(simulation: ligature.Simulation, name: str = name) -> None:

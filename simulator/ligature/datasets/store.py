@@ -19,7 +19,7 @@ import h5py
 
 from ligature.adf.contents import mistaken
 from ligature.datasets.soundness import Unsound, check
-from ligature.paths import reason, regular_file
+from ligature.paths import printable, reason, regular_file
 
 Describe = Callable[[h5py.File], None]
 """Writes into a file what holds for all episodes."""
@@ -221,17 +221,12 @@ def damaged(path: Path) -> Iterator[None]:
     except (DatasetError, MemoryError):
         raise
     except Unsound as error:
-        raise DatasetError(f"'{path}' is not a valid dataset: {_printable(error)}") from error
+        raise DatasetError(f"'{path}' is not a valid dataset: {printable(error)}") from error
     except (OSError, RuntimeError, KeyError, UnicodeError) as error:
         if isinstance(error, OSError) and error.filename is not None:
             raise
         why = error.args[0] if error.args and not isinstance(error, UnicodeError) else error
-        raise DatasetError(f"'{path}' is damaged: {_printable(why)}") from error
-
-
-def _printable(text: object) -> str:
-    """``text`` with escapes for the surrogates of names that are not UTF-8, which terminals cannot print."""
-    return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
+        raise DatasetError(f"'{path}' is damaged: {printable(why)}") from error
 
 
 def episode_names(file: h5py.File) -> list[str]:

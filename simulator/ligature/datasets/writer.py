@@ -23,6 +23,7 @@ from ligature.datasets.rows import EpisodeRows, add_actions
 from ligature.datasets.store import EpisodeStore, unwritable
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
 from ligature.model.soft import TissueBody
+from ligature.paths import printable
 from ligature.process import signals_held
 
 if TYPE_CHECKING:  # datasets of motion need no OpenGL
@@ -106,7 +107,7 @@ class DatasetWriter:
         """Write the attributes that are the same for all episodes."""
         scene, attributes = self._simulation.scene, file.attrs
         attributes["format"], attributes["version"] = FORMAT, ligature.__version__
-        attributes["scene"], attributes["rate"], attributes["task"] = scene.name, self._rate, self._task
+        attributes["scene"], attributes["rate"], attributes["task"] = printable(scene.name), self._rate, self._task
         attributes["phases"], attributes["activities"] = list(self._phases), list(ACTIVITIES)
         attributes["gestures"] = [self._gestures.get(phase, "") for phase in self._phases]
         attributes["depth_unit"] = DEPTH_UNIT

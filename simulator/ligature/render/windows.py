@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ligature.bus.codec import Message
 from ligature.model.scene import Scene
+from ligature.paths import printable
 from ligature.render.context import RenderUnavailable
 from ligature.render.controls import Controls
 from ligature.render.viewer import Figures, Viewer, visible_cameras
@@ -30,7 +31,7 @@ class Windows:
             if each_camera and cameras != [None]:
                 self.windows = _of_cameras(scene)
             else:
-                self.windows = [Window(f"Ligature: {scene.name}")]
+                self.windows = [Window(f"Ligature: {printable(scene.name)}")]
             self._drawing = self.windows[0]
             self._drawing.activate()
             self.controls = Controls(scene, send, self._drawing.context)
@@ -72,7 +73,7 @@ def _of_cameras(scene: Scene) -> list[Window]:
     for index in visible_cameras(scene):
         camera = scene.cameras[index]
         devices = f" [{', '.join(camera.controlling_devices)}]" if camera.controlling_devices else ""
-        title = f"Ligature: {scene.name}: {camera.identity.name}{devices}"
+        title = f"Ligature: {printable(scene.name)}: {camera.identity.name}{devices}"
         windows.append(Window(title, camera.window_size or SIZE, camera.monitor, on_monitor[camera.monitor]))
         on_monitor[camera.monitor] += 1
     return windows
