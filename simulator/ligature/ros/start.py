@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import resource
 import socket
 from typing import Any
 from urllib.parse import urlparse
@@ -24,6 +25,9 @@ from ligature.ros.registrations import claim
 WAITING = 512
 """Connections that may wait; the kernel's own limit is in /proc/sys/net/core/somaxconn."""
 
+MOST_FILES = 65536
+"""Files and connections that a node may have open."""
+
 
 def start_node(name: str, several: bool = False) -> None:
     """Make this process the node ``name``, which takes `WAITING` connections at once and no message of any length.
@@ -32,6 +36,7 @@ def start_node(name: str, several: bool = False) -> None:
     Signals stay the caller's.
     Raises `ligature.ros.registrations.NameTaken`.
     """
+    _allow_files()
     rospy.names._set_caller_id("/unnamed")  # a namespace of ROS_NAMESPACE would hide this node from `claim` of others
     removed = "" if several else claim(f"/{name}")
     ThreadingXMLRPCServer.request_queue_size = WAITING
@@ -47,6 +52,17 @@ def start_node(name: str, several: bool = False) -> None:
     server = tcpros._tcpros_server.tcp_ros_server
     server.inbound_handler = apart(server.inbound_handler)
     server.server_sock.listen(WAITING)
+
+
+def _allow_files() -> None:
+    """Open as many files as the system lets this process: a scene of two arms has 400 topics, of one file each.
+
+    A recorder of all opens as many connections, and most shells allow 1024 files unless asked.
+    """
+    soft, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = MOST_FILES if most == resource.RLIM_INFINITY else min(MOST_FILES, most)
+    if soft not in (resource.RLIM_INFINITY, wanted) and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
 def address_problem(uri: str, master: str) -> str:
