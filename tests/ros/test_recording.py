@@ -240,6 +240,21 @@ def test_recordings_that_cannot_be_made_are_reported_and_leave_nothing(session: 
     assert all(path.read_text() == "mine" for path in mine)
 
 
+def test_a_recorder_that_waits_for_a_clock_is_reported(session: Session, tmp_path: Path) -> None:
+    import rosgraph
+    from ligature.cli.record import record
+
+    master = rosgraph.Master("/ligature_tests")
+    master.setParam("/use_sim_time", True)
+    console = Console(file=io.StringIO(), soft_wrap=True)
+    try:
+        assert record(tmp_path / "a.bag", "", 1.0, 0.001, console) == 1
+    finally:
+        master.deleteParam("/use_sim_time")
+    assert "/use_sim_time is true, and nobody publishes /clock" in console.file.getvalue()  # type: ignore[attr-defined]
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_run_whose_record_exists_ends_and_reports_it(session: Session) -> None:
     done = session.ligature(*RUN, "--record", session.record)
     assert done.returncode != 0

@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from rich.console import Console
@@ -47,7 +48,7 @@ def record(out: Path, exclude: str, seconds: float, keep_free: float, console: C
     why = _reason(lines)
     if why or status != 0 or not part.stat().st_size:
         free = shutil.disk_usage(out.parent).free / 1e9
-        why = why or f"the recorder ended with status {status}"
+        why = why or (f"the recorder ended with status {status}" if status else _why_nothing())
         console.print(f"the recording failed: {why}; {free:.3g} GB of disk space are free", style="red", markup=False)
         _report_rest(part, console)
         return 1
@@ -128,6 +129,18 @@ def _run(command: list[str], seconds: float) -> tuple[list[str], int]:
             continue
         output += text.splitlines()
         return output, process.returncode
+
+
+def _why_nothing() -> str:
+    """Why a recorder that ended well has recorded nothing."""
+    from ligature.ros.master import NO_ANSWER, takes_time_from_clock
+
+    with suppress(*NO_ANSWER):
+        if takes_time_from_clock():
+            return (
+                "nothing was recorded: /use_sim_time is true, and nobody publishes /clock; set the parameter to false"
+            )
+    return "nothing was recorded"
 
 
 def _reason(lines: list[str]) -> str:

@@ -45,6 +45,12 @@ def commanded_topics() -> set[str]:
     return {topic for topic, nodes in subscribers if any(map(is_simulator, nodes))}
 
 
+def takes_time_from_clock() -> bool:
+    """Whether programs on this master wait for messages on ``/clock``; raises one of `NO_ANSWER`."""
+    master = rosgraph.Master("/ligature_look")
+    return master.hasParam("/use_sim_time") and master.getParam("/use_sim_time") is True
+
+
 def is_simulator(node: str) -> bool:
     """Whether a node of this name is a simulator, and not a program beside it or what only watches for rivals."""
     return _SIMULATORS.match(node) is not None and not node.endswith(WATCHER)
