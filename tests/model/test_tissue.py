@@ -277,5 +277,5 @@ def test_free_tissue_is_refused_where_its_mass_is_lost_in_its_stiffness(
     young = least * tissue.STIFF_OVER_HEAVY * (cell / tissue.SETTLING) ** 2 / (1.0 + damping / tissue.SETTLING)
     for density, refused in ((least / share, True), (least * share, False)):
         scene = free(young, density)
-        told = any("too little for a Young's modulus" in d.message for d in scene.diagnostics)
-        assert told == refused == (not scene.tissues), scene.diagnostics
+        reported = any("too little for a Young's modulus" in d.message for d in scene.diagnostics)
+        assert reported == refused == (not scene.tissues), scene.diagnostics
