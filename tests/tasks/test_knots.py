@@ -95,6 +95,33 @@ def test_it_is_one_from_either_side_of_the_vessel():
     assert square_score(turned).success
 
 
+HITCHED = {
+    "around": [(0, 55, -18), (0, 28, -11), (0, 8, -6), (0, 2, -4.5), (0, -3, -4), (0, -6, 0), (0, -3, 5), (0.5, 3, 5)],
+    1: [(6, 24, -8.5), (5, 28, -15.5), (-6, 28, -14.5), (-7, 14, -5.9), (0, 14, -6.4), (9, 14, -6.4)],
+    "over": [(12, 10, 5), (0, 20, 10), (-8, 40, -4)],
+    -1: [(-6, 42, -10), (-5, 44, -20), (6, 44, -20), (7, 34, -10), (0, 34, -11.5), (-9, 34, -11.5)],
+}
+"""Corners in millimetres from the vessel: a short end and a long one around that, two half hitches of the long end around
+the short one, and its way between them."""
+
+
+def hitched(end, *, granny=False):
+    """Two half hitches of opposite hands around a straight short end, whose long end leads to ``end`` (3,)."""
+    second = np.array(HITCHED[-1], dtype=float) * ([-1.0, 1.0, 1.0] if granny else [1.0, 1.0, 1.0])
+    corners = np.vstack([HITCHED["around"], HITCHED[1], HITCHED["over"], second, [end]])
+    parts = [np.linspace(a, b, 12, endpoint=False) for a, b in zip(corners[:-1], corners[1:], strict=True)]
+    return CENTRE + 1e-3 * np.vstack([*parts, corners[-1]])
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(20.0, 60.0), st.floats(-40.0, 80.0), st.floats(0.0, 40.0), st.booleans())
+def test_where_the_ends_of_a_knot_lead_does_not_change_it(x, y, z, granny):
+    """They were led on along y, the farther one backwards through the knot."""
+    found = square_score(hitched((x if granny else -x, y, z), granny=granny))
+    assert (found.determinant, abs(found.signature), found.colourings) == (9, 4 if granny else 0, 27)
+    assert found.success == (not granny)
+
+
 def in_one_end(knot):
     """A thread that lies below the vessel, with a knot in its long end."""
     knot = 1e-3 * knot

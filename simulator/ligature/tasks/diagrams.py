@@ -32,19 +32,25 @@ def crossings(points: Array, seed: int = 0) -> list[Crossing]:
     turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     turn[:, 0] *= np.sign(np.linalg.det(turn))
     a = points @ turn
-    d, n = np.roll(a, -1, axis=0) - a, len(points)
+    d = np.roll(a, -1, axis=0) - a
+    low, high = (bound(a[:, :2], a[:, :2] + d[:, :2]).T[:, None] for bound in (np.minimum, np.maximum))
+    near = (low <= high.swapaxes(1, 2)).all(axis=0)
+    near &= near.T
+    near[0, -1] = False  # neighbours meet, the last edge and the first one too
+    first, second = np.nonzero(np.triu(near, 2))
+    r, s, q = d[first], d[second], a[second] - a[first]
+    with np.errstate(all="ignore"):
+        per = r[:, 0] * s[:, 1] - r[:, 1] * s[:, 0]
+        t, u = (q[:, 0] * s[:, 1] - q[:, 1] * s[:, 0]) / per, (q[:, 0] * r[:, 1] - q[:, 1] * r[:, 0]) / per
+        cross = (t >= 0.0) & (t < 1.0) & (u >= 0.0) & (u < 1.0)
     found: list[Crossing] = []
-    for i in range(n):
-        j = np.arange(i + 2, n if i else n - 1)
-        r, s, q = d[i], d[j], a[j] - a[i]
-        with np.errstate(all="ignore"):
-            per = r[0] * s[:, 1] - r[1] * s[:, 0]
-            t, u = (q[:, 0] * s[:, 1] - q[:, 1] * s[:, 0]) / per, (q[:, 0] * r[1] - q[:, 1] * r[0]) / per
-            cross = np.abs(per) > 1e-9 * np.linalg.norm(r) * np.linalg.norm(s, axis=1)
-        for k in np.flatnonzero(cross & (t >= 0.0) & (t < 1.0) & (u >= 0.0) & (u < 1.0)):
-            below = a[i, 2] + t[k] * r[2] < a[j[k], 2] + u[k] * s[k, 2]
-            first, second, turns = i + float(t[k]), float(j[k] + u[k]), int(np.sign(per[k]))
-            found.append(Crossing(first, second, -turns) if below else Crossing(second, first, turns))
+    for k in np.flatnonzero(cross):
+        if abs(per[k]) <= 1e-9 * np.linalg.norm(r[k]) * np.linalg.norm(s[k]):
+            continue
+        i, j = int(first[k]), int(second[k])
+        below = a[i, 2] + t[k] * r[k, 2] < a[j, 2] + u[k] * s[k, 2]
+        here, there, turns = i + float(t[k]), float(j + u[k]), int(np.sign(per[k]))
+        found.append(Crossing(here, there, -turns) if below else Crossing(there, here, turns))
     return found
 
 

@@ -55,6 +55,14 @@ def closed(points: Array, far: float = 1.0) -> Array:
     return np.vstack([points, way])
 
 
+def led_away(points: Array, centre: Array, far: float = 1.0) -> Array:
+    """An open thread (n, 3), closed far around the knot: each end leads straight away from ``centre`` (3,)."""
+    ends = points[[-1, 0]] - centre
+    ends = centre + far * ends / np.maximum(np.linalg.norm(ends, axis=1), 1e-9)[:, None]
+    up = np.array([0.0, 0.0, 2.0 * far])
+    return np.vstack([points, ends[0], ends + up, ends[1]])
+
+
 def knotted_around(points: Array, centre: Array, radius: float) -> bool:
     """Whether the knot in a thread (n, 3) joins its parts on both sides of the point below a vessel along x.
 
@@ -90,7 +98,7 @@ class ThrowScore:
     Parameters
     ----------
     determinant
-        Of the knot in the thread, its ends led on along y.
+        Of the knot in the thread, its ends led straight away from the vessel.
     turns
         That the thread makes around the vessel.
     drawn
@@ -110,8 +118,7 @@ class ThrowScore:
     @classmethod
     def of(cls, points: Array, centre: Array, drawn: float, hands_empty: bool, time: float) -> ThrowScore:
         """The score of a thread whose elements are at ``points`` (n, 3) now."""
-        side = 1.0 if points[0, 1] > points[-1, 1] else -1.0
-        return cls(determinant(closed(side * points)), turns(points, centre), drawn, hands_empty, time)
+        return cls(determinant(led_away(points, centre)), turns(points, centre), drawn, hands_empty, time)
 
     @property
     def success(self) -> bool:
@@ -134,7 +141,7 @@ class SquareKnotScore:
     Parameters
     ----------
     determinant, signature, colourings
-        Of the knot in the thread, its ends led on along y.
+        Of the knot in the thread, its ends led straight away from the vessel.
     around
         Whether the knot closes a loop around the vessel (`knotted_around`); in a square knot each end leaves on its own
         side, so that turns do not tell.
@@ -162,8 +169,7 @@ class SquareKnotScore:
 
         ``centre`` (3,) and ``radius`` are those of the vessel along x.
         """
-        half_turn = np.array([1.0, 1.0, 1.0] if points[0, 1] > points[-1, 1] else [-1.0, -1.0, 1.0])
-        diagram = Diagram.of(closed(half_turn * points))
+        diagram = Diagram.of(led_away(points, centre))
         below = (np.linalg.norm((points - centre)[:, 1:], axis=1) < 1.5 * radius) & (points[:, 2] < centre[2])
         loop = float(np.median(tension[below])) if below.any() else 0.0
         kind = diagram.determinant, diagram.signature, diagram.colourings
