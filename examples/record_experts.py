@@ -16,33 +16,57 @@ from ligature.datasets import DatasetError, DatasetWriter
 from ligature.datasets.interrupts import interrupted_once
 from ligature.environments import SuturingEnv, env_id
 from ligature.environments.experts import EXPERTS, demonstrate
-from ligature.environments.goals import Suture
+from ligature.environments.goals import GOALS, FirstThrow, Suture
 from ligature.environments.suturing import CONTROL
 
 MOST = 400
-"""Actions of an episode."""
+"""Actions of an episode, where the task's own do not need more."""
 
 PHASES = {"insert": "drive", "puncture": "drive", "pick": "pick_up", "pull_through": "pull_out"}
 """What a task of one phase is, where it is not called as the task."""
 
-GESTURES = {"pick_up": "G12", "hand_over": "G4", "drive": "G3", "pull_out": "G6"}
-"""What JIGSAWS calls phases: PSM1, on the left, picks up and pulls, PSM2 drives."""
+GESTURES = {
+    "pick_up": "G12",
+    "hand_over": "G4",
+    "drive": "G3",
+    "pull_out": "G6",
+    "reach_for_it": "G14",
+    "tighten": "G7",
+}
+"""What JIGSAWS calls phases: PSM1, on the left, picks up and pulls, PSM2 drives, and takes and draws the thread."""
+
+SEVERAL = {"suture": ("drive", "take", "pull_out"), "first_throw": ("wrap", "reach_for_it", "tighten")}
+"""The phases of tasks that have several."""
+
+NEAR = 0.035
+"""Metres from where the throw is to be within which the second arm reaches for the thread."""
 
 
 def phases(task: str) -> tuple[str, ...]:
     """What a demonstration of a task is made of."""
-    return ("drive", "take", "pull_out") if task == "suture" else (PHASES.get(task, task),)
+    return SEVERAL.get(task, (PHASES.get(task, task),))
 
 
 def phase(env: SuturingEnv) -> tuple[str, list[str]]:
     """What is done now, and the arms that do it."""
     arms = [arm.name for arm in env.arms]
+    if isinstance(env.goal, FirstThrow):
+        return _throwing(env, env.goal, arms)
     if not isinstance(env.goal, Suture):
         return phases(env.task)[0], arms
     driver, puller = arms
     if not env.goal.driven:
         return "drive", [driver]
     return ("pull_out", [puller]) if env.goal.taken else ("take", arms)
+
+
+def _throwing(env: SuturingEnv, goal: FirstThrow, arms: list[str]) -> tuple[str, list[str]]:
+    """What is done now while a throw is made, and the arms that do it."""
+    if goal.holds(1) and not goal.holds(0):
+        return "tighten", arms[1:]
+    if goal.holds(1) or np.linalg.norm(env.tool_positions[1] - goal.target()) < NEAR:
+        return "reach_for_it", arms
+    return "wrap", arms[:1]
 
 
 def record(env: SuturingEnv, writer: DatasetWriter, seed: int, noise: float) -> bool:
@@ -73,7 +97,7 @@ def main() -> int:
     )
     arguments.add_argument("--camera", action="append", default=[], help="repeatable; none by default")
     given = arguments.parse_args()
-    env, steps = SuturingEnv(given.task, max_steps=MOST), phases(given.task)
+    env, steps = SuturingEnv(given.task, max_steps=max(MOST, GOALS[given.task].steps)), phases(given.task)
     begin, done, ended, stopped = time.perf_counter(), 0, 0, 0
     try:
         with interrupted_once():

@@ -1,4 +1,4 @@
-"""Cheats of `cheats` for the tasks that hand the needle over, pull the thread through, move a block and sew."""
+"""Cheats of `cheats` for tasks that hand the needle over, pull the thread through, move a block, sew and make a throw."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from ligature.environments.experts import suture
-from ligature.environments.goals import Suture, holds
+from ligature.environments.goals import FirstThrow, Suture, holds
+from ligature.environments.goals.tying import LEFT, RIGHT, holding
 from ligature.environments.hand import OPEN, SHUT, TIGHT, Hand
 from ligature.environments.scripts import AJAR, grasp_side, pull_through, take_over
+from ligature.environments.tying import AWAY, DRAW, Tier, first_throw
 from ligature.model.frames import frame, inverse
 from ligature.tasks.throws import PAD, UP, drawn_back
 
@@ -251,9 +253,64 @@ def sew_and_drop(hand: Hand, observation: Array) -> Iterator[Array]:
     yield from hand.other(1).stay(60, OPEN)
 
 
+# --- first_throw ----------------------------------------------------------------------------
+
+
+def throwing(hand: Hand, observation: Array, until: Callable[[FirstThrow], bool]) -> Iterator[Array]:
+    """What the expert does until something is so."""
+    goal = hand.env.goal
+    assert isinstance(goal, FirstThrow)
+    for action in first_throw(hand, observation):
+        if until(goal):
+            return
+        yield action
+
+
+def leave_the_thread(hand: Hand, observation: Array) -> Iterator[Array]:
+    """let go of the thread"""
+    yield from hand.stay(120, OPEN)
+
+
+def pull_it_taut(hand: Hand, observation: Array) -> Iterator[Array]:
+    """draw the long end taut across the short one, without a throw"""
+    tier = Tier(hand)
+    yield from tier.go(RIGHT, holding(DRAW * [-1.0, 1.0, 1.0], AWAY, tier.goal.vessel + [0.06, 0.03, 0.01]), SHUT)
+    yield from hand.stay(40, SHUT)
+
+
+def wind_it(hand: Hand, observation: Array) -> Iterator[Array]:
+    """bring the long end below the short one, and up again beside the loop instead of through it"""
+    tier = Tier(hand)
+    yield from tier.bring()
+    element = tier.end(RIGHT) + 7
+    yield from tier.take(np.array([0.9, -0.3, -0.3]), element)
+    yield from tier.leave(RIGHT)
+    yield from tier.draw()
+    yield from hand.other(LEFT).stay(40, SHUT)
+
+
+def keep_it_in_both_hands(hand: Hand, observation: Array) -> Iterator[Array]:
+    """take the end through the loop with the second hand, and let go with neither"""
+    yield from throwing(hand, observation, lambda goal: goal.holds(RIGHT) and goal.holds(LEFT))
+    yield from hand.stay(80, SHUT)
+
+
+def leave_it_loose(hand: Hand, observation: Array) -> Iterator[Array]:
+    """draw the end through the loop, and the throw not up to the vessel"""
+    yield from throwing(hand, observation, lambda goal: goal.is_thrown)
+    yield from hand.other(LEFT).stay(80, SHUT)
+
+
+def draw_and_let_go(hand: Hand, observation: Array) -> Iterator[Array]:
+    """draw the throw up to the vessel and let go at once"""
+    yield from throwing(hand, observation, lambda goal: goal.marks()[1] > 0.0)
+    yield from hand.other(LEFT).stay(60, OPEN)
+
+
 HAND_OVER = (swing_away, take_the_thread, drop, both_keep_it, stay_there, take_air)
 PULL_THROUGH = (lift_nothing, pull_the_thread_back, push_back, hold_in_place, needle_alone, pull_and_let_go)
 PEG_TRANSFER = (knock_it_off, put_back, hold_over, keep_it, put_beside)
 SUTURE = (
     leave_it_there, pass_it_in_the_air, keep_both_hands_on_it, take_it_back_out, draw_out_the_needle_alone, sew_and_drop,
 )  # fmt: skip
+FIRST_THROW = (wind_it, keep_it_in_both_hands, leave_it_loose, draw_and_let_go, leave_the_thread, pull_it_taut)

@@ -23,7 +23,14 @@ OPENING = 48
 TABLE = Path(__file__).resolve().parents[2] / "docs" / "cheats.md"
 
 
-@pytest.fixture(scope="module", params=sorted(CHEATS))
+LONG = ("first_throw",)
+"""Environments whose episodes take long to compute: the slow tests have them."""
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(task, marks=pytest.mark.slow) if task in LONG else task for task in sorted(CHEATS)],
+)
 def env(request: pytest.FixtureRequest) -> Iterator[SuturingEnv]:
     made = SuturingEnv(request.param, max_steps=MOST)
     yield made

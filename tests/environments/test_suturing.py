@@ -54,7 +54,7 @@ def test_other_seeds_begin_otherwise() -> None:
     assert np.linalg.norm(targets[0] - targets[1]) > 1e-4
 
 
-@pytest.mark.parametrize("task", ["insert", "puncture", "hand_over", "pull_through", "suture"])
+@pytest.mark.parametrize("task", ["insert", "puncture", "hand_over", "pull_through", "suture", "first_throw"])
 def test_hands_have_arrived_where_an_episode_begins(task: str) -> None:
     env = SuturingEnv(task)
     for seed in range(6):
@@ -275,8 +275,12 @@ def rolled_out(env: SuturingEnv, seed: int, steps: int) -> tuple[np.ndarray, str
 
 
 @pytest.fixture(
-    scope="module", params=["reach", "pick", "insert", "hand_over", "pull_through", "peg_transfer", "suture"]
-)
+    scope="module",
+    params=[
+        "reach", "pick", "insert", "hand_over", "pull_through", "peg_transfer", "suture",
+        pytest.param("first_throw", marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
 def used(request: pytest.FixtureRequest) -> Iterator[SuturingEnv]:
     """An environment that all examples use in turn."""
     env = SuturingEnv(request.param, max_steps=None)
@@ -378,7 +382,10 @@ def rolled(env: gymnasium.Env) -> np.ndarray:
     return np.array([*seen, np.append(env.reset()[0], 0.0)])
 
 
-SLOW = [pytest.param(task, marks=pytest.mark.slow) for task in ("pick", "pull_through", "peg_transfer", "suture")]
+SLOW = [
+    pytest.param(task, marks=pytest.mark.slow)
+    for task in ("pick", "pull_through", "peg_transfer", "suture", "first_throw")
+]
 
 
 @pytest.mark.parametrize("task", ["reach", "insert", "hand_over", *SLOW])
@@ -448,7 +455,9 @@ def test_options_of_reset_are_refused() -> None:
 @pytest.mark.parametrize("task", sorted(GOALS))
 def test_the_specification_has_the_length_of_episodes(task: str) -> None:
     assert gymnasium.spec(env_id(task)).max_episode_steps == GOALS[task].steps
-    assert task in ("hand_over", "pull_through", "peg_transfer", "suture") or GOALS[task].steps == MAX_STEPS
+    assert (
+        task in ("hand_over", "pull_through", "peg_transfer", "suture", "first_throw") or GOALS[task].steps == MAX_STEPS
+    )
 
 
 def test_episodes_of_made_environments_are_cut_where_the_specification_has_it() -> None:

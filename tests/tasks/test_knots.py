@@ -116,7 +116,7 @@ def hitched(end, *, granny=False):
 @settings(max_examples=30, deadline=None)
 @given(st.floats(20.0, 60.0), st.floats(-40.0, 80.0), st.floats(0.0, 40.0), st.booleans())
 def test_where_the_ends_of_a_knot_lead_does_not_change_it(x, y, z, granny):
-    """They were led on along y, the farther one backwards through the knot."""
+    """They went on along y, the farther one backwards through the knot."""
     found = square_score(hitched((x if granny else -x, y, z), granny=granny))
     assert (found.determinant, abs(found.signature), found.colourings) == (9, 4 if granny else 0, 27)
     assert found.success == (not granny)

@@ -19,6 +19,7 @@ from ligature.environments.hand import JAW, OPEN, SHUT, TIGHT, WIDE, Hand
 from ligature.environments.layout import ACTION, TARGET, action_width
 from ligature.environments.scripts import hand_over, peg_transfer, pull_through
 from ligature.environments.suturing import SuturingEnv
+from ligature.environments.tying import first_throw
 from ligature.model.frames import frame, inverse
 from ligature.tasks.throws import BEHIND, drawn_back
 
@@ -117,7 +118,7 @@ def _draw(puller: Hand, goal: Suture) -> Array:
 EXPERTS: dict[str, Policy] = {
     "reach": reach, "pick": pick, "insert": insert, "puncture": insert,
     "hand_over": hand_over, "pull_through": pull_through, "peg_transfer": peg_transfer,
-    "suture": suture,
+    "suture": suture, "first_throw": first_throw,
 }  # fmt: skip
 """Experts by the names of the tasks."""
 

@@ -22,7 +22,7 @@ from ligature.bundle import SCENES
 from ligature.camera_simulation import Simulation
 from ligature.environments import layout
 from ligature.environments.actions import ArmActions
-from ligature.environments.goals import GOALS, Goal, Progress, holds
+from ligature.environments.goals import GOALS, Goal, Progress
 from ligature.environments.randomisation import Drawn, Randomisation
 from ligature.environments.reading import ArmReading
 from ligature.environments.variation import Channel, dress, place, varied
@@ -61,7 +61,7 @@ class EnvState:
 
 
 class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
-    """One PSM or several before a pad with a needle, or a board.
+    """One PSM or several before a pad with a needle, a board, or a vessel with a thread.
 
     **Actions**, `Box(-1, 1, (7,))`, for 20 ms each; of several arms 7 numbers each, one arm after the other:
 
@@ -81,7 +81,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     | 0 to 5 | joint values | rad, m |
     | 6 | jaw | rad |
     | 7 to 13 | pose of the tip in the arm's base, x y z qx qy qz qw | m |
-    | 14 to 20 | pose of what is handled: the needle, or another body of the task | m |
+    | 14 to 20 | pose of what is handled: the needle, the end of the thread, or another body of the task | m |
     | 21 to 26 | twist of it | m/s, rad/s |
     | 27 to 29 | the tool's control point | m |
     | 30 to 32 | the target | m |
@@ -93,7 +93,7 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     | 50 | share of the time for which something must be so until the task is done | |
     | 51 | stage: lifted by half (``pick``), share of the holes passed (``insert``, ``puncture``), 0.5 when the second \
 arm holds the needle and 1 when it alone does (``hand_over``), a quarter each for entry and exit passed, the needle \
-driven, and taken by the second arm (``suture``) | |
+driven, and taken by the second arm (``suture``), 1 when the thread has the throw (``first_throw``) | |
 
     Each further arm adds 33 numbers: joint values, jaw, pose of the tip, control point, joint velocities, set-point of
     the tip and of the jaw, and 1 while its jaws hold what is handled.
@@ -458,11 +458,10 @@ driven, and taken by the second arm (``suture``) | |
             arm.tip_position(), self._goal.target(), (self._progress.left,), arm.joint_velocities,
             arm.jaw[1:2], _on_side(arm.setpoint, self._tip_sides[0]), arm.jaw_setpoint[:1], self._goal.marks(),
         ]  # fmt: skip
-        for arm, described, side in zip(self._readings[1:], self._arms[1:], self._tip_sides[1:], strict=True):
+        for k, (arm, side) in enumerate(zip(self._readings[1:], self._tip_sides[1:], strict=True), 1):
             numbers += [
                 arm.joints, arm.jaw[:1], _on_side(arm.tip, side), arm.tip_position(), arm.joint_velocities,
-                arm.jaw[1:2], _on_side(arm.setpoint, side), arm.jaw_setpoint[:1],
-                (holds(self._simulation, described, self.needle),),
+                arm.jaw[1:2], _on_side(arm.setpoint, side), arm.jaw_setpoint[:1], (self._goal.holds(k),),
             ]  # fmt: skip
         found = np.concatenate(numbers)
         return found if self._channel is None else self._channel.sense(found)

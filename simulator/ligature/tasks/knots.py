@@ -55,7 +55,7 @@ def closed(points: Array, far: float = 1.0) -> Array:
     return np.vstack([points, way])
 
 
-def led_away(points: Array, centre: Array, far: float = 1.0) -> Array:
+def extended(points: Array, centre: Array, far: float = 1.0) -> Array:
     """An open thread (n, 3), closed far around the knot: each end leads straight away from ``centre`` (3,)."""
     ends = points[[-1, 0]] - centre
     ends = centre + far * ends / np.maximum(np.linalg.norm(ends, axis=1), 1e-9)[:, None]
@@ -98,7 +98,7 @@ class ThrowScore:
     Parameters
     ----------
     determinant
-        Of the knot in the thread, its ends led straight away from the vessel.
+        Of the knot in the thread, its ends continued straight away from the vessel.
     turns
         That the thread makes around the vessel.
     drawn
@@ -118,7 +118,7 @@ class ThrowScore:
     @classmethod
     def of(cls, points: Array, centre: Array, drawn: float, hands_empty: bool, time: float) -> ThrowScore:
         """The score of a thread whose elements are at ``points`` (n, 3) now."""
-        return cls(determinant(led_away(points, centre)), turns(points, centre), drawn, hands_empty, time)
+        return cls(determinant(extended(points, centre)), turns(points, centre), drawn, hands_empty, time)
 
     @property
     def success(self) -> bool:
@@ -141,7 +141,7 @@ class SquareKnotScore:
     Parameters
     ----------
     determinant, signature, colourings
-        Of the knot in the thread, its ends led straight away from the vessel.
+        Of the knot in the thread, its ends continued straight away from the vessel.
     around
         Whether the knot closes a loop around the vessel (`knotted_around`); in a square knot each end leaves on its own
         side, so that turns do not tell.
@@ -169,7 +169,7 @@ class SquareKnotScore:
 
         ``centre`` (3,) and ``radius`` are those of the vessel along x.
         """
-        diagram = Diagram.of(led_away(points, centre))
+        diagram = Diagram.of(extended(points, centre))
         below = (np.linalg.norm((points - centre)[:, 1:], axis=1) < 1.5 * radius) & (points[:, 2] < centre[2])
         loop = float(np.median(tension[below])) if below.any() else 0.0
         kind = diagram.determinant, diagram.signature, diagram.colourings

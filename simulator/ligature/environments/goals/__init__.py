@@ -7,12 +7,14 @@ from ligature.environments.goals.pegs import PegTransfer
 from ligature.environments.goals.pulling import PullThrough
 from ligature.environments.goals.reaching import Pick, Reach
 from ligature.environments.goals.stitching import Suture
+from ligature.environments.goals.tying import FirstThrow
 
 __all__ = [
     "GOALS",
     "Goal",
     "HandOver",
     "Insert",
+    "FirstThrow",
     "PegTransfer",
     "Pick",
     "Progress",
@@ -27,6 +29,6 @@ __all__ = [
 GOALS: dict[str, type[Goal]] = {
     "reach": Reach, "pick": Pick, "insert": Insert, "puncture": Puncture,
     "hand_over": HandOver, "pull_through": PullThrough, "peg_transfer": PegTransfer,
-    "suture": Suture,
+    "suture": Suture, "first_throw": FirstThrow,
 }  # fmt: skip
 """Tasks by name."""

@@ -186,7 +186,7 @@ class Goal:
         """The control point (3,) of an arm of the task, world axes."""
         return tip_position(self._simulation, self._arms[arm])
 
-    def _holds(self, arm: int = 0) -> bool:
+    def holds(self, arm: int = 0) -> bool:
         """Whether the jaws of an arm of the task hold its body."""
         return holds(self._simulation, self._arms[arm], self.body)
 

@@ -115,7 +115,7 @@ class Insert(Goal):
     def observe(self) -> Progress:
         """Way of the tip along the circle that is left, and how far it is beside it."""
         through, inside, self._stage = self._look()
-        self._held, now = self._holds(), self._simulation.time
+        self._held, now = self.holds(), self._simulation.time
         self._kept = self._grasped.observe(self._held, now)
         free = self._free.observe(not self._held, now)
         if through and self._kept >= HOLD - EARLY:

@@ -114,7 +114,7 @@ class HandOver(Goal):
     def observe(self) -> Progress:
         """How far the giver must still go away once the taker has the needle; before that, how far the taker is."""
         now, T = self._simulation.time, pose7_matrix(self._poses()[self.body])
-        self._given, taken = self._holds(GIVER), self._holds(TAKER)
+        self._given, taken = self.holds(GIVER), self.holds(TAKER)
         self._stage = 0.5 * taken + 0.5 * (taken and not self._given)
         gap = float(np.linalg.norm(self._along @ T[:3, :3].T + T[:3, 3] - self._tip(GIVER), axis=1).min())
         empty = self._simulation.grasps[self._arms[GIVER].name] is None

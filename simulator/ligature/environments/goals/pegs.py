@@ -77,7 +77,7 @@ class PegTransfer(Goal):
         aside, empty = float(np.hypot(x, y)), self._simulation.grasps[self._arms[0].name] is None
         around = aside <= self.AROUND
         there = around and z <= self.LOW and float(T[2, 2]) >= self.UPRIGHT
-        self._held = self._holds()
+        self._held = self.holds()
         self._rested = self._rest.observe(there and empty, self._simulation.time)
         if self._rested >= HOLD - EARLY:
             return Progress(0.0, True)

@@ -126,7 +126,7 @@ class PullThrough(Goal):
     def observe(self) -> Progress:
         """What is left of needle and thread to pull through, and before the needle is held, how far the tool is."""
         now, pulled = self._simulation.time, self._seam.look()
-        self._held, self._drawn, self._beyond = self._holds(), pulled.drawn, pulled.beyond
+        self._held, self._drawn, self._beyond = self.holds(), pulled.drawn, pulled.beyond
         self._done_for = self._kept.observe(self._held and self._drawn >= self.LENGTH, now)
         if self._done_for >= HOLD - EARLY:
             return Progress(0.0, True)

@@ -78,7 +78,7 @@ class Pick(Goal):
         """How much higher the needle must be; before it is held, how far the tool is from it too."""
         points, now = self._points(), self._simulation.time
         self._at, height = points[1], float(points[:, 2].min()) - self._rest
-        self._held = self._holds()
+        self._held = self.holds()
         self._high = self._high or (self._held and height >= 0.5 * self.HEIGHT)
         self._lifted = self._up.observe(self._held and height >= self.HEIGHT, now)
         free = self._free.observe(not self._held, now)

@@ -104,7 +104,7 @@ class Suture(Insert):
         """Where the tip should be next; once it is out at the exit, where the needle is to be taken and then drawn."""
         if not self._driven:
             return super().target()
-        if not self._holds(PULLER):
+        if not self.holds(PULLER):
             return self.place()
         return np.asarray(self._places[1] + (self.LENGTH + 2.0 * self.arc.radius) * UP)
 
@@ -118,7 +118,7 @@ class Suture(Insert):
                 after = self.TAKE + self.RELEASE + self.arc.length + self.LENGTH
                 return Progress(drive.left + far + after, lost=drive.lost)
         now, pulled = self._simulation.time, self.pulled()
-        self._held, held = self._holds(DRIVER), self._holds(PULLER)
+        self._held, held = self.holds(DRIVER), self.holds(PULLER)
         alone = held and self._simulation.grasps[self._arms[DRIVER].name] is None
         self._taken = self._taken or (alone and pulled.needle_inside)
         self._drawn = pulled.drawn
