@@ -106,6 +106,7 @@ def test_blind_search_by_reward_finds_no_success(env: SuturingEnv) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 def test_experts_succeed_and_cheats_fail_wherever_the_needle_lies(env: SuturingEnv) -> None:
     task, seeds = task_of(env), range(20, 40)
     done = [roll(env, EXPERTS[task], seed).success for seed in seeds]
