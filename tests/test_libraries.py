@@ -55,7 +55,7 @@ USES = {
     "video.encode(Path('out.mp4'), [np.zeros((48, 64, 3), np.uint8)] * 3, (64, 48), 30, video.CODECS['av1'])",
     "picture": SCENE + "sim.cameras['cameraL'].capture()",
     "decomposition": "from ligature.mesh import Mesh, MeshPart\nfrom ligature.mesh.decompose import decompose\n"
-    "from tests.mesh.shapes import ell\ndecompose(Mesh(Path('/ell.obj'), (MeshPart('', *ell()),)))",
+    "sys.path.append(str(ROOT))\nfrom tests.mesh.shapes import ell\ndecompose(Mesh(Path('/ell.obj'), (MeshPart('', *ell()),)))",
     "environment": "import gymnasium, ligature.environments\n"
     "env = gymnasium.make('ligature/Reach-v0')\nenv.reset(seed=0)\nenv.step(env.action_space.sample())",
     "arrays": "import h5py, pyarrow.parquet, pyarrow\n"

@@ -46,7 +46,8 @@ def values(option: Any) -> st.SearchStrategy[Any]:
         return st.floats(1.0, 900.0).map(lambda x: round(x, 3))
     if kind.startswith("integer"):
         return st.integers(1, 900)
-    return st.lists(word, min_size=1, max_size=3, unique=True) if option.multiple else word
+    found = st.sampled_from(["/etc", "/home", "/usr", "/var"]) if getattr(option.type, "exists", False) else word
+    return st.lists(found, min_size=1, max_size=3, unique=True) if option.multiple else found
 
 
 def given_to(file: str, arguments: dict[str, Any]) -> dict[str, Any]:
