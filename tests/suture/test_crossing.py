@@ -11,11 +11,12 @@ from ligature.model.shapes import Cylinder
 from ligature.suture import layout
 from ligature.suture.crossing import NEAREST, _share_of_pair
 from ligature.suture.description import FREE, Attachment, from_material
-from ligature.tasks.knots import closed, determinant
+from ligature.tasks.knots import determinant
 from scipy.spatial.transform import Rotation
 
 from tests.suture.conftest import Bench, body, damped
 from tests.suture.knots import room, square_knot, wander, wound
+from tests.tasks.threads import closed
 
 KNOTS = {
     "unknot": lambda rng: (wound(1, 3, 3, rng.choice([-1, 1])), 1),

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ligature.tasks.diagrams import Diagram, crossings
-from ligature.tasks.knots import closed, determinant
+from ligature.tasks.knots import determinant
 
 from tests.suture.knots import square_knot, wander, wound
+from tests.tasks.threads import closed
 
 LEFT, RIGHT = wound(2, 3, 3)[::6], wound(2, 3, 3, -1)[::6]
 FAR = 100.0

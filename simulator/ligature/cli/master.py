@@ -10,6 +10,8 @@ import xmlrpc.client
 from http.client import HTTPConnection, HTTPException
 from urllib.parse import urlparse
 
+from ligature.ros.hosts import is_here, places
+
 DEFAULT_MASTER = "http://127.0.0.1:11311"
 DEFAULT_PORT = 11311
 ANSWER_TIMEOUT = 1.0
@@ -39,7 +41,7 @@ def obstacle(uri: str) -> str:
     host, port = _address(uri)
     if not host or not port:
         return f"ROS_MASTER_URI '{uri}' is not an address; write one such as {DEFAULT_MASTER}"
-    if not _is_here(host):
+    if not any(map(is_here, places(host, socket.AF_INET))):
         return f"the ROS master at {uri} does not answer, and '{host}' is not this machine"
     if _taken(port):
         return f"another program, not a ROS master, uses port {port}; set ROS_MASTER_URI to a free port"
@@ -61,16 +63,6 @@ def _address(uri: str) -> tuple[str, int]:
     except ValueError:  # brackets without an address, a port that is no number
         return "", 0
     return (host, port) if where.scheme == "http" and not re.search(r"\s", uri) else ("", 0)
-
-
-def _is_here(host: str) -> bool:
-    """Whether ``host`` is an address of this machine: only then a socket can be bound to it."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind((host, 0))
-        except (OSError, TypeError, ValueError):  # a text that no host can have, too
-            return False
-    return True
 
 
 def _taken(port: int) -> bool:

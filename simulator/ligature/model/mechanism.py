@@ -192,15 +192,16 @@ class Mechanism:
         poses, direction, origin, _ = self._forward(x)
         residual = np.zeros(6 * len(self.chains))
         for k, chain in enumerate(self.chains):
-            residual[6 * k : 6 * k + 6] = self._open_by(
-                chain, poses, self._along(chain, poses, x, direction, origin)[0]
-            )
+            T_end, _ = self._along(chain, poses, x, direction, origin)
+            residual[6 * k : 6 * k + 6] = self._open_by(chain, *self._ends(chain, poses), T_end)
         return residual
 
-    def _open_by(self, chain: Chain, poses: Mapping[int, Array], T_end: Array) -> Array:
-        """Open length and rotation vector (6,) of one loop; ``T_end`` is where its chain ends."""
-        T_outer = poses[chain.outer] @ chain.T_outer
-        R = (poses[chain.inner] @ chain.T_inner)[:3, :3].T
+    def _ends(self, chain: Chain, poses: Mapping[int, Array]) -> tuple[Array, Array]:
+        """Rotation (3, 3) from the world to a loop's joint, and the frame (4, 4) where the loop closes."""
+        return (poses[chain.inner] @ chain.T_inner)[:3, :3].T, poses[chain.outer] @ chain.T_outer
+
+    def _open_by(self, chain: Chain, R: Array, T_outer: Array, T_end: Array) -> Array:
+        """Open length and rotation vector (6,) of one loop, from where its chain ends to where it closes (`_ends`)."""
         residual = np.zeros(6)
         residual[:3] = R @ (T_outer[:3, 3] - T_end[:3, 3]) / self.size
         if not chain.point:
@@ -250,9 +251,8 @@ class Mechanism:
         residual, J = np.zeros(6 * len(self.chains)), np.zeros((6 * len(self.chains), len(x)))
         for k, chain in enumerate(self.chains):
             T_end, own = self._along(chain, poses, x, direction, origin)
-            residual[6 * k : 6 * k + 6] = self._open_by(chain, poses, T_end)
-            T_outer = poses[chain.outer] @ chain.T_outer
-            R = (poses[chain.inner] @ chain.T_inner)[:3, :3].T
+            R, T_outer = self._ends(chain, poses)
+            residual[6 * k : 6 * k + 6] = self._open_by(chain, R, T_outer, T_end)
             for sign, at, columns in ((1.0, T_outer, moves[chain.outer]), (-1.0, T_end, moves[chain.inner] + own)):
                 c = np.array(columns, dtype=int)
                 slides = linear[c]
@@ -299,8 +299,7 @@ class Mechanism:
         D = np.zeros((6 * len(self.chains), 12 * len(column)))
         for k, closing in enumerate(self.chains):
             T_end, _ = self._along(closing, poses, x, direction, origin)
-            T_outer = poses[closing.outer] @ closing.T_outer
-            R = (poses[closing.inner] @ closing.T_inner)[:3, :3].T
+            R, T_outer = self._ends(closing, poses)
             ways = ((1.0, T_outer[:3, 3], paths[closing.outer]), (-1.0, T_end[:3, 3], [*paths[closing.inner], closing]))
             for sign, end, way in ways:
                 for chain in way:

@@ -9,8 +9,6 @@ from __future__ import annotations
 import ipaddress
 import os
 import resource
-import socket
-from typing import Any
 from urllib.parse import urlparse
 
 import rospy
@@ -19,6 +17,7 @@ from rosgraph.xmlrpc import ThreadingXMLRPCServer
 
 from ligature.ros.connections import give_up_publishers
 from ligature.ros.handshakes import apart
+from ligature.ros.hosts import is_here, places
 from ligature.ros.intake import bound_messages
 from ligature.ros.registrations import claim
 
@@ -68,13 +67,13 @@ def _allow_files() -> None:
 def address_problem(uri: str, master: str) -> str:
     """Why programs elsewhere may not reach the node at ``uri`` of the ``master`` at another; empty where they may."""
     host, other = (urlparse(address).hostname or "" for address in (uri, master))
-    places = _places(host)
-    alone = all(ipaddress.ip_address(place[0]).is_loopback for _, place in places)
-    if not places:
+    found = places(host)
+    alone = all(ipaddress.ip_address(place[0]).is_loopback for _, place in found)
+    if not found:
         why = "is unknown to this machine"
-    elif not any(map(_is_here, places)):
+    elif not any(map(is_here, found)):
         why = "is not an address of this machine"
-    elif alone and not any(map(_is_here, _places(other))):
+    elif alone and not any(map(is_here, places(other))):
         why = f"is known on this machine alone, but the ROS master is on {other}"
     else:
         return ""
@@ -82,22 +81,3 @@ def address_problem(uri: str, master: str) -> str:
         f"programs look for the topics at '{host}', which {why}: those that cannot reach it get no messages; "
         "set ROS_IP to the address of this machine"
     )
-
-
-def _places(host: str) -> list[tuple[int, Any]]:
-    """Families and socket addresses of a host; none for one that is unknown."""
-    try:
-        return [(family, place) for family, _, _, _, place in socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)]
-    except (OSError, UnicodeError):
-        return []
-
-
-def _is_here(where: tuple[int, Any]) -> bool:
-    """Whether a socket can be bound to the address, as to those of this machine alone."""
-    family, place = where
-    try:
-        with socket.socket(family, socket.SOCK_STREAM) as probe:
-            probe.bind(place)
-    except OSError:
-        return False
-    return True

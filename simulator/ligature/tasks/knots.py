@@ -48,13 +48,6 @@ def determinant(points: Array, seed: int = 0) -> int:
     return abs(round(float(np.linalg.det(rows[1:, 1:]))))
 
 
-def closed(points: Array, far: float = 1.0) -> Array:
-    """An open thread (n, 3), closed far around the knot: its first end leads on along y, its last one the other way."""
-    middle = points.mean(axis=0)
-    way = middle + far * np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 2.0], [0.0, -1.0, 2.0], [0.0, -1.0, 0.0]])
-    return np.vstack([points, way])
-
-
 def extended(points: Array, centre: Array, far: float = 1.0) -> Array:
     """An open thread (n, 3), closed far around the knot: each end leads straight away from ``centre`` (3,)."""
     ends = points[[-1, 0]] - centre
