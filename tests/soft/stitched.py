@@ -17,13 +17,14 @@ from ligature.model.frames import axis_rotation, matrix_pose7, matrix_quaternion
 from ligature.soft.frame import Frame
 from ligature.soft.thread import SceneThread
 from ligature.suture.description import from_material
-from ligature.tasks.knots import closed, determinant
+from ligature.tasks.knots import determinant
 from ligature.tissue.block import TissueBlock
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from tests.suture.conftest import DT, Bench, body, damped
 from tests.suture.throws import in_hands
+from tests.tasks.threads import closed
 
 Array = NDArray[np.float64]
 

@@ -12,11 +12,12 @@ import numpy as np
 from ligature.model.frames import axis_rotation, pose7_matrix
 from ligature.model.shapes import Cylinder
 from ligature.suture.description import FREE, Attachment, RodDescription, from_material
-from ligature.tasks.knots import closed, determinant
+from ligature.tasks.knots import determinant
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from tests.suture.conftest import DT, Bench, body, damped
+from tests.tasks.threads import closed
 
 Array = NDArray[np.float64]
 
