@@ -17,7 +17,7 @@ log=build/logs/unit_tests.log
 # shellcheck disable=SC2086,SC2016
 setsid sh -c 'echo 5 2>/dev/null >/proc/self/autogroup; exec "$@"' sh \
     nice -n 19 env --default-signal=INT,QUIT \
-    "$python" -m pytest -m "not slow" -n 2 --dist loadfile tests $ignored >"$log" 2>&1 </dev/null &
+    "$python" -m pytest -m "not slow" -n 2 --dist worksteal tests $ignored >"$log" 2>&1 </dev/null &
 others=$!
 trap 'kill "$others" 2>/dev/null' EXIT
 trap 'exit 130' INT

@@ -55,6 +55,7 @@ def test_every_page_stands_in_the_contents_of_the_site() -> None:
     assert {page.stem for page in PAGES} - {"index"} <= named
 
 
+@pytest.mark.slow
 def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, ROOT / "docs" / "site" / "build.py", tmp_path / "site", "dummy"],

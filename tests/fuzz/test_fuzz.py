@@ -15,10 +15,10 @@ from tests.fuzz.seeds import Seed, seeds, write_scene
 
 
 def test_no_mutant_crashes_hangs_or_surprises() -> None:
-    outcome = run(1000, jobs=2)
+    outcome = run(500, jobs=2)
     assert outcome.failures == []
-    assert sum(outcome.ended.values()) == 1000
-    assert min(outcome.total(verdict) for verdict in ("clean", "findings", "refused")) > 50
+    assert sum(outcome.ended.values()) == 500
+    assert min(outcome.total(verdict) for verdict in ("clean", "findings", "refused")) > 25
 
 
 def test_what_check_passes_runs_a_second_finite_and_slow() -> None:

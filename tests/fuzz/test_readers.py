@@ -20,12 +20,16 @@ from tests.fuzz.run import READERS as CAMPAIGN
 from tests.fuzz.run import run
 
 
+EACH = 20
+"""Files of each kind."""
+
+
 def test_no_file_of_a_stranger_crashes_hangs_or_surprises() -> None:
-    outcome = run(50 * len(READERS), jobs=2, campaign=CAMPAIGN, chunk=200)
+    outcome = run(EACH * len(READERS), jobs=2, campaign=CAMPAIGN, chunk=200)
     assert outcome.failures == []
     for reader in READERS:
-        assert outcome.ended[f"{reader.kind} refused"] > 5, reader.kind
-        assert outcome.ended[f"{reader.kind} clean"] + outcome.ended[f"{reader.kind} refused"] == 50
+        assert outcome.ended[f"{reader.kind} refused"] > 2, reader.kind
+        assert outcome.ended[f"{reader.kind} clean"] + outcome.ended[f"{reader.kind} refused"] == EACH
 
 
 @pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.kind)
