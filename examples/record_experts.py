@@ -16,7 +16,7 @@ from ligature.datasets import DatasetError, DatasetWriter
 from ligature.datasets.interrupts import interrupted_once
 from ligature.environments import SuturingEnv, env_id
 from ligature.environments.experts import EXPERTS, demonstrate
-from ligature.environments.goals import GOALS, FirstThrow, Suture
+from ligature.environments.goals import GOALS, FirstThrow, KnotTie, Suture
 from ligature.environments.suturing import CONTROL
 
 MOST = 400
@@ -35,7 +35,10 @@ GESTURES = {
 }
 """What JIGSAWS calls phases: PSM1, on the left, picks up and pulls, PSM2 drives, and takes and draws the thread."""
 
-SEVERAL = {"suture": ("drive", "take", "pull_out"), "first_throw": ("wrap", "reach_for_it", "tighten")}
+SEVERAL = {
+    "suture": ("drive", "take", "pull_out"), "first_throw": ("wrap", "reach_for_it", "tighten"),
+    "knot_tie": ("first_throw", "second_throw", "tighten"),
+}  # fmt: skip
 """The phases of tasks that have several."""
 
 NEAR = 0.035
@@ -52,6 +55,8 @@ def phase(env: SuturingEnv) -> tuple[str, list[str]]:
     arms = [arm.name for arm in env.arms]
     if isinstance(env.goal, FirstThrow):
         return _throwing(env, env.goal, arms)
+    if isinstance(env.goal, KnotTie):
+        return phases(env.task)[env.goal.made], arms
     if not isinstance(env.goal, Suture):
         return phases(env.task)[0], arms
     driver, puller = arms

@@ -1,4 +1,4 @@
-"""Cheats of `cheats` for tasks that hand the needle over, pull the thread through, move a block, sew and make a throw."""
+"""Cheats of `cheats` for tasks that hand the needle over, pull the thread through, move a block, sew and make knots."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from ligature.environments.experts import suture
 from ligature.environments.goals import FirstThrow, Suture, holds
-from ligature.environments.goals.tying import LEFT, RIGHT, holding
+from ligature.environments.goals.ligating import LEFT, RIGHT, holding
 from ligature.environments.hand import OPEN, SHUT, TIGHT, Hand
+from ligature.environments.knotting import Knotter
 from ligature.environments.scripts import AJAR, grasp_side, pull_through, take_over
 from ligature.environments.tying import AWAY, DRAW, Tier, first_throw
 from ligature.model.frames import frame, inverse
@@ -283,7 +284,7 @@ def wind_it(hand: Hand, observation: Array) -> Iterator[Array]:
     tier = Tier(hand)
     yield from tier.bring()
     element = tier.end(RIGHT) + 7
-    yield from tier.take(np.array([0.9, -0.3, -0.3]), element)
+    yield from tier.take(LEFT, np.array([0.9, -0.3, -0.3]), element)
     yield from tier.leave(RIGHT)
     yield from tier.draw()
     yield from hand.other(LEFT).stay(40, SHUT)
@@ -307,6 +308,67 @@ def draw_and_let_go(hand: Hand, observation: Array) -> Iterator[Array]:
     yield from hand.other(LEFT).stay(60, OPEN)
 
 
+# --- knot_tie -------------------------------------------------------------------------------
+
+
+def one_throw(hand: Hand, observation: Array) -> Iterator[Array]:
+    """make one throw, draw it, and let go"""
+    knotter = Knotter(hand)
+    yield from knotter.first()
+    yield from knotter.leave(LEFT)
+    yield from knotter.hands[LEFT].stay(120, AJAR)
+
+
+def wrap_it_only(hand: Hand, observation: Array) -> Iterator[Array]:
+    """lay the long end around the short one a second time, and draw it without passing it through"""
+    knotter = Knotter(hand)
+    yield from knotter.first()
+    yield from knotter.hook()
+    yield from knotter.go(RIGHT, drawn_back(knotter.hands[RIGHT].tool, 0.05), SHUT)
+    yield from knotter.draw()
+    yield from knotter.hands[LEFT].stay(60, SHUT)
+
+
+def leave_it_open(hand: Hand, observation: Array) -> Iterator[Array]:
+    """make both throws, and let go without drawing the second one"""
+    knotter = Knotter(hand)
+    yield from knotter.first()
+    yield from knotter.second()
+    yield from knotter.let_go()
+
+
+def draw_one_end(hand: Hand, observation: Array) -> Iterator[Array]:
+    """make both throws, draw the long end alone, and let go"""
+    knotter = Knotter(hand)
+    yield from knotter.first()
+    yield from knotter.second()
+    yield from knotter.draw_second()
+    yield from knotter.let_go()
+
+
+def keep_both_ends(hand: Hand, observation: Array) -> Iterator[Array]:
+    """make the knot, draw both ends, and let go of neither"""
+    yield from up_to_its_end(Knotter(hand))
+    yield from hand.stay(60, SHUT)
+
+
+def keep_one_end(hand: Hand, observation: Array) -> Iterator[Array]:
+    """make the knot, draw both ends, and let go of one alone"""
+    knotter = Knotter(hand)
+    yield from up_to_its_end(knotter)
+    yield from knotter.leave(LEFT)
+    yield from knotter.hands[LEFT].stay(60, AJAR)
+
+
+def up_to_its_end(knotter: Knotter) -> Iterator[Array]:
+    """All that the expert does but for letting go."""
+    yield from knotter.first()
+    yield from knotter.second()
+    yield from knotter.draw_second()
+    yield from knotter.take_short_end()
+    yield from knotter.draw_apart()
+
+
 HAND_OVER = (swing_away, take_the_thread, drop, both_keep_it, stay_there, take_air)
 PULL_THROUGH = (lift_nothing, pull_the_thread_back, push_back, hold_in_place, needle_alone, pull_and_let_go)
 PEG_TRANSFER = (knock_it_off, put_back, hold_over, keep_it, put_beside)
@@ -314,3 +376,6 @@ SUTURE = (
     leave_it_there, pass_it_in_the_air, keep_both_hands_on_it, take_it_back_out, draw_out_the_needle_alone, sew_and_drop,
 )  # fmt: skip
 FIRST_THROW = (wind_it, keep_it_in_both_hands, leave_it_loose, draw_and_let_go, leave_the_thread, pull_it_taut)
+KNOT_TIE = (
+    leave_it_open, draw_one_end, keep_both_ends, keep_one_end, wrap_it_only, one_throw, leave_the_thread, pull_it_taut,
+)  # fmt: skip

@@ -15,7 +15,7 @@ from ligature.environments.goals import GOALS
 from ligature.environments.hand import JAW, SHUT, Hand
 from ligature.environments.layout import HELD
 
-from tests.environments.cheats import CHEATS, MOST, QUICK, described, roll
+from tests.environments.cheats import CHEATS, MOST, QUICK, described, most, roll
 
 OPENING = 48
 """The number of an observation that has the set-point of the jaw."""
@@ -23,7 +23,7 @@ OPENING = 48
 TABLE = Path(__file__).resolve().parents[2] / "docs" / "cheats.md"
 
 
-LONG = ("first_throw",)
+LONG = ("first_throw", "knot_tie")
 """Environments whose episodes take long to compute: the slow tests have them."""
 
 
@@ -32,7 +32,7 @@ LONG = ("first_throw",)
     params=[pytest.param(task, marks=pytest.mark.slow) if task in LONG else task for task in sorted(CHEATS)],
 )
 def env(request: pytest.FixtureRequest) -> Iterator[SuturingEnv]:
-    made = SuturingEnv(request.param, max_steps=MOST)
+    made = SuturingEnv(request.param, max_steps=most(request.param))
     yield made
     made.close()
 
@@ -108,11 +108,12 @@ def test_blind_search_by_reward_finds_no_success(env: SuturingEnv) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_experts_succeed_and_cheats_fail_wherever_the_needle_lies(env: SuturingEnv) -> None:
-    task, seeds = task_of(env), range(20, 40)
+    task = task_of(env)
+    seeds = range(20, 25 if task == "knot_tie" else 40)
     done = [roll(env, EXPERTS[task], seed).success for seed in seeds]
     assert sum(done) >= 0.95 * len(done), dict(zip(seeds, done, strict=True))
     for policy in CHEATS[task]:
-        for seed in range(20, 23):
+        for seed in seeds[: 1 if task == "knot_tie" else 3]:
             assert not roll(env, policy, seed).success, (policy.__name__, seed)
 
 

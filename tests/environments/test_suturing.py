@@ -54,7 +54,9 @@ def test_other_seeds_begin_otherwise() -> None:
     assert np.linalg.norm(targets[0] - targets[1]) > 1e-4
 
 
-@pytest.mark.parametrize("task", ["insert", "puncture", "hand_over", "pull_through", "suture", "first_throw"])
+@pytest.mark.parametrize(
+    "task", ["insert", "puncture", "hand_over", "pull_through", "suture", "first_throw", "knot_tie"]
+)
 def test_hands_have_arrived_where_an_episode_begins(task: str) -> None:
     env = SuturingEnv(task)
     for seed in range(6):
@@ -278,7 +280,7 @@ def rolled_out(env: SuturingEnv, seed: int, steps: int) -> tuple[np.ndarray, str
     scope="module",
     params=[
         "reach", "pick", "insert", "hand_over", "pull_through", "peg_transfer", "suture",
-        pytest.param("first_throw", marks=pytest.mark.slow),
+        pytest.param("first_throw", marks=pytest.mark.slow), pytest.param("knot_tie", marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def used(request: pytest.FixtureRequest) -> Iterator[SuturingEnv]:
@@ -384,7 +386,7 @@ def rolled(env: gymnasium.Env) -> np.ndarray:
 
 SLOW = [
     pytest.param(task, marks=pytest.mark.slow)
-    for task in ("pick", "pull_through", "peg_transfer", "suture", "first_throw")
+    for task in ("pick", "pull_through", "peg_transfer", "suture", "first_throw", "knot_tie")
 ]
 
 
@@ -456,7 +458,8 @@ def test_options_of_reset_are_refused() -> None:
 def test_the_specification_has_the_length_of_episodes(task: str) -> None:
     assert gymnasium.spec(env_id(task)).max_episode_steps == GOALS[task].steps
     assert (
-        task in ("hand_over", "pull_through", "peg_transfer", "suture", "first_throw") or GOALS[task].steps == MAX_STEPS
+        task in ("hand_over", "pull_through", "peg_transfer", "suture", "first_throw", "knot_tie")
+        or GOALS[task].steps == MAX_STEPS
     )
 
 

@@ -1,4 +1,4 @@
-"""What counts as the first throw of a ligature: by the crossings of the thread, not by what is near to what."""
+"""What counts as a throw of a ligature, and as a square knot: by the crossings of the thread, not by what is near."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ligature.environments.goals import FirstThrow
-from ligature.environments.goals.tying import LYING
+from ligature.environments.goals import FirstThrow, KnotTie
+from ligature.environments.goals.ligating import LYING, Ligating
 from ligature.environments.suturing import _scene
 
 from tests.tasks.test_knots import CENTRE, HITCHED, hitched
@@ -23,7 +23,12 @@ def goal() -> Iterator[FirstThrow]:
     simulation.close()
 
 
-def upright(goal: FirstThrow, corners: np.ndarray) -> np.ndarray:
+@pytest.fixture(scope="module")
+def knot(goal: FirstThrow) -> KnotTie:
+    return KnotTie(goal._simulation, goal._arms)
+
+
+def upright(goal: Ligating, corners: np.ndarray) -> np.ndarray:
     """A thread around a vessel along x, given in millimetres from it, around the upright one of the scene."""
     parts = [np.linspace(a, b, 12, endpoint=False) for a, b in zip(corners[:-1], corners[1:], strict=True)]
     return goal.vessel + 1e-3 * np.vstack([*parts, corners[-1]]) @ LYING.T
@@ -56,9 +61,48 @@ def test_a_second_throw_is_not_the_first_one(goal: FirstThrow) -> None:
         assert not goal.thrown(goal.vessel + (points - CENTRE) @ LYING.T)
 
 
+@settings(max_examples=10, deadline=None)
+@given(end=ENDS, granny=st.booleans())
+def test_a_second_throw_counts_where_it_makes_a_square_knot(
+    knot: KnotTie, end: tuple[float, float, float], granny: bool
+) -> None:
+    end = (end[0] if granny else -end[0], end[1], end[2])
+    assert knot.throws(knot.vessel + (hitched(end, granny=granny) - CENTRE) @ LYING.T) == (1 if granny else 2)
+
+
+@settings(max_examples=10, deadline=None)
+@given(end=ENDS)
+def test_one_throw_is_half_of_a_square_knot(knot: KnotTie, end: tuple[float, float, float]) -> None:
+    assert knot.throws(upright(knot, np.vstack([HITCHED["around"], HITCHED[1], [end]]))) == 1
+
+
+@settings(max_examples=10, deadline=None)
+@given(share=st.floats(0.07, 0.11) | st.floats(0.13, 1.0))
+def test_a_knot_is_close_where_both_throws_are_at_the_vessel(knot: KnotTie, share: float) -> None:
+    """What is beyond 6 mm from the vessel's middle has a share of its size; both ends lead on as they did."""
+    corners = np.vstack([HITCHED["around"], HITCHED[1], HITCHED["over"], HITCHED[-1]]).astype(float) * [0.6, 1.0, 1.0]
+    for axis, side in ((1, 1.0), (2, -1.0)):
+        beyond = side * corners[:, axis] > 6.0
+        corners[beyond, axis] = share * corners[beyond, axis] + (1.0 - share) * side * 6.0
+    points = upright(knot, np.vstack([(0.0, 60.0, -20.0), corners, (-40.0, 30.0, 10.0)]))
+    assert knot.throws(points) == 2
+    assert knot.close(points) == (share < 0.12)
+
+
+@settings(max_examples=10, deadline=None)
+@given(aside=st.floats(0.012, 0.1), angle=st.floats(0.0, 2.0 * np.pi))
+def test_a_square_knot_beside_the_vessel_is_none(knot: KnotTie, aside: float, angle: float) -> None:
+    points = knot.vessel + (hitched((-40.0, 30.0, 10.0)) - CENTRE) @ LYING.T
+    assert knot.throws(points + (0.06 + aside) * np.array([np.cos(angle), np.sin(angle), 0.0])) == 0
+
+
 def test_a_thread_that_lies_as_the_scene_has_it_has_no_throw_and_no_loop(goal: FirstThrow) -> None:
     assert not goal.thrown(goal.points())
     assert goal.slack(goal.points()) == FirstThrow.LOOP
+
+
+def test_a_thread_that_lies_as_the_scene_has_it_has_no_square_knot(knot: KnotTie) -> None:
+    assert knot.throws(knot.points()) == 0 and not knot.close(knot.points())
 
 
 @settings(max_examples=20, deadline=None)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ligature.environments.goals import Insert, Suture, holds
 from ligature.environments.hand import JAW, OPEN, SHUT, TIGHT, WIDE, Hand
+from ligature.environments.knotting import knot_tie
 from ligature.environments.layout import ACTION, TARGET, action_width
 from ligature.environments.scripts import hand_over, peg_transfer, pull_through
 from ligature.environments.suturing import SuturingEnv
@@ -118,7 +119,7 @@ def _draw(puller: Hand, goal: Suture) -> Array:
 EXPERTS: dict[str, Policy] = {
     "reach": reach, "pick": pick, "insert": insert, "puncture": insert,
     "hand_over": hand_over, "pull_through": pull_through, "peg_transfer": peg_transfer,
-    "suture": suture, "first_throw": first_throw,
+    "suture": suture, "first_throw": first_throw, "knot_tie": knot_tie,
 }  # fmt: skip
 """Experts by the names of the tasks."""
 

@@ -93,7 +93,8 @@ class SuturingEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     | 50 | share of the time for which something must be so until the task is done | |
     | 51 | stage: lifted by half (``pick``), share of the holes passed (``insert``, ``puncture``), 0.5 when the second \
 arm holds the needle and 1 when it alone does (``hand_over``), a quarter each for entry and exit passed, the needle \
-driven, and taken by the second arm (``suture``), 1 when the thread has the throw (``first_throw``) | |
+driven, and taken by the second arm (``suture``), 1 when the thread has the throw (``first_throw``), a third each for \
+the first throw, the square knot, and both ends drawn (``knot_tie``) | |
 
     Each further arm adds 33 numbers: joint values, jaw, pose of the tip, control point, joint velocities, set-point of
     the tip and of the jaw, and 1 while its jaws hold what is handled.

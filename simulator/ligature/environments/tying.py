@@ -15,8 +15,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.environments.goals import FirstThrow
-from ligature.environments.goals.tying import LEFT, RIGHT, holding
+from ligature.environments.goals.ligating import LEFT, RIGHT, Ligating, holding
 from ligature.environments.hand import SHUT, Hand
 from ligature.environments.layout import ACTION
 from ligature.model.frames import frame
@@ -59,6 +58,10 @@ SLOW = 0.6
 """Share of an action beside the thread."""
 
 
+SIDES = ("right", "left")
+"""Names of the hands."""
+
+
 class Missed(ValueError):
     """A step did not succeed."""
 
@@ -77,7 +80,7 @@ class Tier:
 
     def __init__(self, hand: Hand) -> None:
         goal = hand.env.goal
-        assert isinstance(goal, FirstThrow)
+        assert isinstance(goal, Ligating)
         self.goal, self.hands = goal, (hand, hand.other(LEFT))
 
     def bring(self) -> Iterator[Array]:
@@ -93,8 +96,8 @@ class Tier:
         element = self.end(RIGHT) + BESIDE
         way = self.goal.points()[element] - self.gap()
         for back, pace in APPROACH:
-            yield from self.go(LEFT, drawn_back(self.grasp(way, element), back), SHUT, pace)
-        yield from self.take(way, element)
+            yield from self.go(LEFT, drawn_back(self.grasp(LEFT, way, element), back), SHUT, pace)
+        yield from self.take(LEFT, way, element)
         if not self.laced():
             raise Missed("the left hand did not reach through the loop")
         yield from self.leave(RIGHT)
@@ -107,7 +110,7 @@ class Tier:
         """The left hand draws the throw up to the vessel."""
         for *place, most in DRAWN:
             T = holding(DRAW, AWAY, self.goal.vessel + place)
-            yield from self.go(LEFT, T, SHUT, SLOW, lambda most=most: self.pull() > most)  # type: ignore[misc]
+            yield from self.go(LEFT, T, SHUT, SLOW, lambda most=most: self.pull(LEFT) > most)  # type: ignore[misc]
 
     # --- seeing -----------------------------------------------------------------------------
 
@@ -115,12 +118,13 @@ class Tier:
         """The element at which a hand holds the thread; raises `Missed` when it holds none."""
         held = self.goal.held(number)
         if held is None:
-            raise Missed(f"the {('right', 'left')[number]} hand lost the thread")
+            raise Missed(f"the {SIDES[number]} hand lost the thread")
         return held
 
-    def pull(self) -> float:
-        """Tension of the long end beside the left hand."""
-        return float(self.goal.tension()[self.end(LEFT) - 8 :][:6].max())
+    def pull(self, number: int) -> float:
+        """Tension of the thread beside a hand; raises `Missed` when it holds none."""
+        self.end(number)
+        return self.goal.pull(number)
 
     def gap(self) -> Array:
         """The middle (3,) of the loop beside the vessel: between the short end and the strand on its other side."""
@@ -132,16 +136,25 @@ class Tier:
 
     def laced(self) -> bool:
         """Whether the thread, up to where the left hand holds it, makes a throw with that hand's tool."""
-        points, T = self.goal.points()[: self.end(LEFT) + 1], self.hands[LEFT].tool
+        return determinant(self.drawn(LEFT)) == HALF_KNOT
+
+    def drawn(self, number: int) -> Array:
+        """The thread up to where a hand holds it, as that draws it along its tool: closed far away."""
+        points, T = self.goal.points()[: self.end(number) + 1], self.hands[number].tool
         shaft = np.array([T[:3, 3] - far * T[:3, 2] for far in (0.0, 0.02, 0.2, 1.0)])
         free, up = self.goal.vessel + [0.0, 1.0, 0.0], np.array([0.0, 0.0, 2.0])
-        return determinant(np.vstack([free, points, shaft, shaft[-1] + up, free + up])) == HALF_KNOT
+        return np.vstack([free, points, shaft, shaft[-1] + up, free + up])
 
-    def grasp(self, way: Array, element: int) -> Array:
-        """Pose (4, 4) of a tool along ``way`` (3,) that takes an element of the thread."""
+    def grasp(self, number: int, way: Array, element: int) -> Array:
+        """Pose (4, 4) of a tool along ``way`` (3,) that takes an element of the thread, turned the shorter way.
+
+        The jaws are alike: half a turn about the tool changes nothing.
+        """
         points = self.goal.points()
-        element = min(element, len(points) - 2)
-        return holding(way, points[element + 1] - points[element - 1], points[element])
+        element = min(max(element, 1), len(points) - 2)
+        along = points[element + 1] - points[element - 1]
+        along = along if along @ self.hands[number].tool[:3, 0] > 0.0 else -along
+        return holding(way, along, points[element])
 
     # --- moving -----------------------------------------------------------------------------
 
@@ -176,19 +189,19 @@ class Tier:
             if going:
                 yield np.sum([action for action in actions if action is not None], axis=0)
 
-    def take(self, way: Array, element: int) -> Iterator[Array]:
-        """The left hand goes forward along itself, and closes its jaws on the thread; `Missed` where it cannot."""
-        hand = self.hands[LEFT]
+    def take(self, number: int, way: Array, element: int) -> Iterator[Array]:
+        """A hand goes forward along itself, and closes its jaws on the thread; `Missed` where it cannot."""
+        hand = self.hands[number]
         for more in (0, 1, -1, 2):
-            yield from self.go(LEFT, drawn_back(self.grasp(way, element + more), 0.008), AJAR, SLOW)
+            yield from self.go(number, drawn_back(self.grasp(number, way, element + more), 0.008), AJAR, SLOW)
             for _ in range(3):
-                yield from self.go(LEFT, self.grasp(way, element + more), AJAR, SLOW, most=40)
+                yield from self.go(number, self.grasp(number, way, element + more), AJAR, SLOW, most=40)
             yield from hand.stay(14, SHUT)
-            held = self.goal.held(LEFT)
+            held = self.goal.held(number)
             if held is not None and abs(held - element) <= WRONG:
                 return
             yield from hand.stay(10, AJAR)
-        raise Missed("the left hand did not find the thread")
+        raise Missed(f"the {SIDES[number]} hand did not find the thread")
 
     def leave(self, number: int) -> Iterator[Array]:
         """A hand opens, and draws back along itself."""

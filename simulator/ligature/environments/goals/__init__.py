@@ -7,14 +7,15 @@ from ligature.environments.goals.pegs import PegTransfer
 from ligature.environments.goals.pulling import PullThrough
 from ligature.environments.goals.reaching import Pick, Reach
 from ligature.environments.goals.stitching import Suture
-from ligature.environments.goals.tying import FirstThrow
+from ligature.environments.goals.tying import FirstThrow, KnotTie
 
 __all__ = [
     "GOALS",
     "Goal",
     "HandOver",
-    "Insert",
     "FirstThrow",
+    "Insert",
+    "KnotTie",
     "PegTransfer",
     "Pick",
     "Progress",
@@ -29,6 +30,6 @@ __all__ = [
 GOALS: dict[str, type[Goal]] = {
     "reach": Reach, "pick": Pick, "insert": Insert, "puncture": Puncture,
     "hand_over": HandOver, "pull_through": PullThrough, "peg_transfer": PegTransfer,
-    "suture": Suture, "first_throw": FirstThrow,
+    "suture": Suture, "first_throw": FirstThrow, "knot_tie": KnotTie,
 }  # fmt: skip
 """Tasks by name."""
