@@ -78,3 +78,24 @@ def test_all_boxes_are_compared_where_bullet_keeps_its_pairs_elsewhere(
     assert len(bullet.find_owners(0)[0]) == 0
     monkeypatch.setattr(bullet, name, getattr(bullet, name) + 8)
     assert len(bullet.find_owners(boxes)[0]) == 0
+
+
+def test_groups_of_bodies_feel_contacts_whenever_bullet_has_some(tmp_path: Path) -> None:
+    """Contacts are not asked for where no pair of boxes may have one: PyBullet, asked in every tick, is the judge."""
+    rng, seen = np.random.default_rng(0), set()
+    for _ in range(4):
+        (tmp_path / "model.yaml").write_text(_scene(rng), encoding="utf-8")
+        simulation = Simulation(ligature.load(tmp_path / "model.yaml"))
+        wrenches, bodies = simulation._world.wrenches, len(simulation.scene.bodies)
+        groups = [(body,) for body in range(bodies)]
+        groups += [tuple(rng.choice(bodies, n, replace=False).tolist()) for n in (2, 4, 8)]
+        bits = [wrenches.group(group) for group in groups]
+        for _ in range(100):
+            if rng.random() < 0.1:
+                way = rng.standard_normal(6) * 10.0 ** rng.uniform(-2, 1)
+                simulation.bodies[f"Ball{rng.integers(BALLS)}"].command_twist(way.tolist())
+            simulation.step()
+            felt = [bool(wrenches.felt() & bit) for bit in bits]
+            assert felt == [wrenches._contacts.touch(wrenches._own(group)) for group in groups]
+            seen.add(any(felt))
+    assert seen == {True, False}

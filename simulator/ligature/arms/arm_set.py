@@ -134,11 +134,11 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
         """Write the state of all arms."""
         if self._arms:
             felt = self._world.wrenches.felt()
-            for m, arm in enumerate(self._arms):
+            for m in self._records.stale(state, felt):
                 try:
-                    self._records.look(m, state, felt)
+                    self._records.look(m, felt)
                 except Exception as error:
-                    self._fault("write_state", arm, error)
+                    self._fault("write_state", self._arms[m], error)
             motions = self._world.engine.motions
             motions.prepare()
             if self._records.write(motions.handle, motions.table):

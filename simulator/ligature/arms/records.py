@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate, chain
 from operator import attrgetter, is_
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -160,7 +162,12 @@ class ArmRecords:
         self._groups = [(m, g, group) for m, arm in enumerate(arms) for g, group in enumerate(_groups(arm))]
         for m, g, group in self._groups:
             self._find(m, g, group)
-        self._outline_of = [attrgetter(*arm.outline()) for arm in arms]
+        self._named = SimpleNamespace(**{f"arm{m}": arm for m, arm in enumerate(arms)}, none=None)
+        names = [[f"arm{m}.{name}" for name in arm.outline()] for m, arm in enumerate(arms)]
+        self._outline_of = attrgetter(*chain(*names), "none")
+        self._outline: tuple[Any, ...] = ()
+        ends = list(accumulate(map(len, names)))
+        self._parts = [slice(end - len(own), end) for end, own in zip(ends, names, strict=True)]
         self._outlines: list[tuple[Any, ...]] = [UNKNOWN] * len(arms)
         self._bases = [arm.base_frame for arm in arms]
         self._groups_felt = [FROM_DRIVES] * len(arms)
@@ -180,13 +187,20 @@ class ArmRecords:
         else:
             arrays.fingers[m] = True
 
-    def look(self, m: int, state: StateRecord, felt: int) -> None:
-        """Take down what commands and contacts changed of arm ``m``, for `write`; ``felt`` is that of wrenches."""
+    def stale(self, state: StateRecord, felt: int) -> list[int]:
+        """The arms to `look` at: those that feel something, and all if commands changed any, which is found at once."""
         if state is not self._state:
             self._attach(state)
-        outline = self._outline_of[m](self._arms[m])
+        before, self._outline = self._outline, self._outline_of(self._named)
+        if len(before) != len(self._outline) or not all(map(is_, before, self._outline)):
+            return list(range(len(self._arms)))
+        return [m for m, group in enumerate(self._groups_felt) if group & felt or self._felt[m]]
+
+    def look(self, m: int, felt: int) -> None:
+        """Take down what commands and contacts changed of arm ``m``, for `write`; ``felt`` is that of wrenches."""
+        outline = self._outline[self._parts[m]]
         if not all(map(is_, outline, self._outlines[m])):
-            self._renew(m, self._arms[m], state)
+            self._renew(m, self._arms[m])
             self._outlines[m] = outline
         if self._groups_felt[m] & felt:
             self._arrays.wrench[m], self._felt[m] = self._arms[m].spatial_measured_cf(), True
@@ -206,9 +220,9 @@ class ArmRecords:
         records = state["arm"][0]
         fields = np.asarray(records).view(np.uint8).reshape(len(self._arms), ARM_DTYPE.itemsize)
         self._numbers = fields[:, _FIRST_NUMBER:].view(np.float64)
-        self._outlines = [UNKNOWN] * len(self._arms)
+        self._outline, self._outlines = (), [UNKNOWN] * len(self._arms)
 
-    def _renew(self, m: int, arm: Arm, state: StateRecord) -> None:
+    def _renew(self, m: int, arm: Arm) -> None:
         """Update modes, kinematics and frames of an arm, and write its status."""
         arrays = self._arrays
         for number, g, group in self._groups:
@@ -219,7 +233,8 @@ class ArmRecords:
         arrays.base[m], arrays.absolute[m], arrays.fresh[m] = arm.base_frame, arm.cf_orientation_absolute, True
         self._bases[m] = arm.base_frame  # kept, so that no other gets its identity
         self._groups_felt[m] = getattr(arm.tip_wrench, "group", FROM_DRIVES)
-        _write_status(state["arm"][0][m], arm)
+        assert self._state is not None
+        _write_status(self._state["arm"][0][m], arm)
 
 
 def _groups(arm: Arm) -> tuple[Axes, ...]:

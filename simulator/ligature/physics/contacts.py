@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ligature.kernels import inlined, kernel
 from ligature.physics.bullet import get_contacts, init_contact_request, submit, whole_at, word_at
 from ligature.physics.engine import Engine
+from ligature.physics.parking import Boxes, count_pairs, paired
+from ligature.physics.trees import open_trees
 from ligature.tables import opener, table_of
 
 Integers = NDArray[np.int64]
@@ -25,15 +27,28 @@ MOST_GROUPS = 62
 
 
 class Groups(NamedTuple):
-    """The groups of each link and body, one bit for each group: u multibodies of at most l links, b bodies."""
+    """The groups of each link and body, one bit for each group: u multibodies of at most l links, b bodies, n boxes."""
 
     of_link: Integers  # (u, 1 + l), the base first
     of_body: Integers  # (b,)
+    of_box: Integers  # (n,) of what each of `Boxes` belongs to
     answer: Integers  # (3,) its own address, and where Bullet puts a number of contacts and their address
     seen: Integers  # (2,) the tick whose contacts were looked at, -1 for none, and the groups with one
 
 
-_open_groups = opener(Groups(np.zeros((1, 1), np.int64), *np.zeros((3, 1), np.int64)))
+_open_groups = opener(Groups(np.zeros((1, 1), np.int64), *np.zeros((4, 1), np.int64)))
+
+
+@inlined
+def _may_touch(boxes: Boxes, groups: Groups) -> bool:
+    """Whether Bullet has a pair of boxes out of which a group may have a contact; asking for contacts takes longer."""
+    if boxes.at.shape[0] == 0:  # without boxes there is no address of the pairs either
+        return True
+    for j in range(count_pairs(boxes)):
+        one, other = paired(boxes, j, 0), paired(boxes, j, 1)
+        if (groups.of_box[one] if one >= 0 else 0) != (groups.of_box[other] if other >= 0 else 0):
+            return True
+    return False
 
 
 @inlined
@@ -54,14 +69,15 @@ def _touching(handle: int, groups: Groups) -> int:
 
 
 @kernel
-def felt(handle: int, ticks: Integers, acted: Flags, table: Integers) -> int:
-    """The groups with a contact outside their group in the last of the ``ticks``, or with a body that is ``acted`` on.
+def felt(handle: int, tree_table: Integers, acted: Flags, table: Integers) -> int:
+    """The groups with a contact outside their group in the last tick, or with a body that is ``acted`` on.
 
     ``table`` is that of `Groups`.
     """
-    groups = _open_groups(table)
-    if groups.seen[0] != ticks[0]:
-        groups.seen[0], groups.seen[1] = ticks[0], _touching(handle, groups)
+    trees, groups = open_trees(tree_table), _open_groups(table)
+    if groups.seen[0] != trees.ticks[0]:
+        groups.seen[0] = trees.ticks[0]
+        groups.seen[1] = _touching(handle, groups) if _may_touch(trees.boxes, groups) else 0
     found = groups.seen[1]
     for body in range(acted.shape[0]):
         if acted[body]:
@@ -76,9 +92,9 @@ class Contacts:
         self._engine = engine
         places = list(engine.body_at)
         shape = 1 + max((uid for uid, _ in places), default=0), 2 + max((link for _, link in places), default=0)
-        whole = np.int64
-        self._groups = Groups(np.zeros(shape, whole), np.zeros(len(engine.scene.bodies), whole), np.zeros(3, whole),
-                              np.full(2, -1))  # fmt: skip
+        bodies, boxes = len(engine.scene.bodies), len(engine.motions.trees.boxes.at)
+        of_link, of_body, of_box, answer = (np.zeros(n, np.int64) for n in (shape, bodies, boxes, 3))
+        self._groups = Groups(of_link, of_body, of_box, answer, np.full(2, -1))
         self._groups.answer[0] = self._groups.answer.ctypes.data
         self._table = table_of(self._groups)
 
@@ -88,6 +104,9 @@ class Contacts:
             self._groups.of_link[uid, 1 + link] |= 1 << number
         for body in bodies:
             self._groups.of_body[body] |= 1 << number
+        for box, place in enumerate(self._engine.boxed):
+            if place in own:
+                self._groups.of_box[box] |= 1 << number
         self.forget()
 
     def forget(self) -> None:
@@ -97,7 +116,7 @@ class Contacts:
     def felt(self, acted: Flags) -> int:
         """The groups that touch others, or with a body that is ``acted`` on, one bit each; it takes a handle."""
         motions = self._engine.motions
-        return int(felt(motions.handle, motions.trees.ticks, acted, self._table))
+        return int(felt(motions.handle, motions.table, acted, self._table))
 
     def touch(self, own: Collection[tuple[int, int]]) -> bool:
         """Whether ``own`` multibodies and links touched others in the last tick; this asks PyBullet."""

@@ -100,13 +100,25 @@ def unpark(boxes: Boxes) -> None:
 @inlined
 def _keep_paired(boxes: Boxes) -> None:
     """Keep the boxes that Bullet has a pair of."""
-    pairs, first = word_at(boxes.phase[0] + PAIRS), word_at(boxes.phase[0] + FIRST_BOX)
-    at = word_at(pairs + FIRST_PAIR)
-    for j in range(whole_at(pairs + PAIR_COUNT)):
+    for j in range(count_pairs(boxes)):
         for side in range(2):
-            place = (word_at(at + PAIR_BYTES * j + 8 * side) - first) // BOX_BYTES
-            if 0 <= place < boxes.row.shape[0] and boxes.row[place] >= 0:
-                boxes.out[boxes.row[place]] = False
+            i = paired(boxes, j, side)
+            if i >= 0:
+                boxes.out[i] = False
+
+
+@inlined
+def count_pairs(boxes: Boxes) -> int:
+    """How many pairs of boxes Bullet has."""
+    return whole_at(word_at(boxes.phase[0] + PAIRS) + PAIR_COUNT)
+
+
+@inlined
+def paired(boxes: Boxes, j: int, side: int) -> int:
+    """Which box is on a ``side``, 0 or 1, of Bullet's ``j``-th pair; -1 is another than these."""
+    at = word_at(word_at(boxes.phase[0] + PAIRS) + FIRST_PAIR) + PAIR_BYTES * j + 8 * side
+    place = (word_at(at) - word_at(boxes.phase[0] + FIRST_BOX)) // BOX_BYTES
+    return boxes.row[place] if 0 <= place < boxes.row.shape[0] else -1
 
 
 @inlined

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.state import MAX_TOUCHES, StateRecord
+from ligature.model.state import MAX_TOUCHES, FieldViews, StateRecord
 from ligature.model.subsystem import ALWAYS, Subsystem, kept, put_back
 from ligature.sensing.queries import Touchable
 
@@ -20,7 +20,7 @@ class Touches(Subsystem):
 
     def __init__(self, bodies: Touchable) -> None:
         self._bodies = bodies
-        self._watching = False
+        self._watching, self._fields = False, FieldViews("touch_count")
         self._points: NDArray[np.float64] = np.zeros((0, 3))
         self._forces: NDArray[np.float64] = np.zeros((0, 3))
 
@@ -43,9 +43,9 @@ class Touches(Subsystem):
 
     def write_state(self, state: StateRecord) -> None:
         """Write the contacts of the last reading."""
-        count = len(self._points)
-        if count or state["touch_count"][0]:
-            state["touch_count"] = count
+        (reported,), count = self._fields.of(state), len(self._points)
+        if count or reported[0]:
+            reported[0] = count
             for name, found in (("touch_point", self._points), ("touch_force", self._forces)):
                 state[name][0, :count], state[name][0, count:] = found, 0.0
 

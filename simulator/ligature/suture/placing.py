@@ -167,27 +167,55 @@ def bounds(points: Array, out: Array) -> None:
             out[1, a] = max(out[1, a], points[i, a])
 
 
-@kernel
-def write_elements(
-    first: int, x: Array, q: Array, v: Array, w: Array, inertial_to_body: Array, tension: Array, bodies: Integers,
-    poses: Array, twists: Array, tensions: Array, R: Array,
-) -> None:  # fmt: skip
-    """Poses of body frames, twists and tension of a rod's elements, to rows ``bodies`` (n,) of the last arrays.
+class Elements(NamedTuple):
+    """The elements of a rod, n of them, the nodes from ``first`` on, and what of the state record has them."""
 
-    The elements are the nodes from ``first`` on; ``inertial_to_body`` (n, 7) are their body frames in I.
-    """
-    for e in range(bodies.shape[0]):
-        i, b = first + e, bodies[e]
-        local, out = inertial_to_body[e], poses[b]
-        matrix_of(q[i, 0], q[i, 1], q[i, 2], q[i, 3], R)
-        px, py, pz = rotate(R, local[0], local[1], local[2])
-        out[0], out[1], out[2] = x[i, 0] + px, x[i, 1] + py, x[i, 2] + pz
-        out[3], out[4], out[5], out[6] = multiply(
-            q[i, 0], q[i, 1], q[i, 2], q[i, 3], local[3], local[4], local[5], local[6]
-        )
+    first: Integers  # (1,)
+    x: Array  # (N, 3) of all nodes, as the next three
+    q: Array  # (N, 4)
+    v: Array  # (N, 3)
+    w: Array  # (N, 3)
+    inertial_to_body: Array  # (n, 7) body frames in I
+    tension: Array  # (n,)
+    bodies: Integers  # (n,) rows of the record
+    poses: Array  # (b, 7)
+    twists: Array  # (b, 6)
+    tensions: Array  # (b,)
+    R: Array  # (3, 3) scratch
+
+
+_open_elements = opener(
+    Elements(
+        first=np.zeros(1, np.int64),
+        x=np.zeros((1, 3)),
+        q=np.zeros((1, 4)),
+        v=np.zeros((1, 3)),
+        w=np.zeros((1, 3)),
+        inertial_to_body=np.zeros((1, 7)),
+        tension=np.zeros(1),
+        bodies=np.zeros(1, np.int64),
+        poses=np.zeros((1, 7)),
+        twists=np.zeros((1, 6)),
+        tensions=np.zeros(1),
+        R=np.zeros((3, 3)),
+    )  # fmt: skip
+)
+
+
+@kernel
+def write_elements(table: Integers) -> None:
+    """Poses of body frames, twists and tension of a rod's elements, by a table of `Elements`."""
+    e = _open_elements(table)
+    for k in range(e.bodies.shape[0]):
+        i, b = e.first[0] + k, e.bodies[k]
+        q, local, out, twist = e.q[i], e.inertial_to_body[k], e.poses[b], e.twists[b]
+        matrix_of(q[0], q[1], q[2], q[3], e.R)
+        px, py, pz = rotate(e.R, local[0], local[1], local[2])
+        out[0], out[1], out[2] = e.x[i, 0] + px, e.x[i, 1] + py, e.x[i, 2] + pz
+        out[3], out[4], out[5], out[6] = multiply(q[0], q[1], q[2], q[3], local[3], local[4], local[5], local[6])
         for a in range(3):
-            twists[b, a], twists[b, 3 + a] = v[i, a], w[i, a]
-        tensions[b] = tension[e]
+            twist[a], twist[3 + a] = e.v[i, a], e.w[i, a]
+        e.tensions[b] = e.tension[k]
 
 
 @inlined

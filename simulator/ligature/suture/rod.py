@@ -23,7 +23,7 @@ from ligature.suture.description import Attachment, RodDescription
 from ligature.suture.parting import depth_of, draw_out, find_inside
 from ligature.suture.partners import JawPads, Partner, PointConstraint
 from ligature.suture.passages import Passages, passages
-from ligature.suture.placing import bounds, sound, write_elements
+from ligature.suture.placing import Elements, bounds, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
 from ligature.suture.springs import CAPACITY, read_other_loads, springs
 from ligature.suture.ticking import RodTick, tick_rod
@@ -121,7 +121,7 @@ class Rod:
         self._attached = [attachment.body for attachment in description.attachments]
         self._positions, self._corners = self._nodes.x[self._own], np.zeros((2, 3))
         self._inertial_to_body = np.array([matrix_pose7(inverse(T)) for T in description.T_body_inertial])
-        self._bodies, self._scratch = np.array(description.bodies, dtype=np.int64), np.zeros((3, 3))
+        self._bodies = np.array(description.bodies, dtype=np.int64)
         self.springs = springs(CAPACITY + n)
         self._spring_table = table_of(self.springs)
         self.take_passages(passages(1), 0)
@@ -185,13 +185,18 @@ class Rod:
         n = len(self.description.mass)
         return bool(sound(self._first, n, nodes.x, nodes.q, nodes.v, nodes.w, MAX_SPEED))
 
-    def write(self, poses: Array, twists: Array, tensions: Array) -> None:
-        """Write the elements' state to their bodies' rows: body frames (b, 7), twists (b, 6), tension (b,)."""
+    def report_to(self, poses: Array, twists: Array, tensions: Array) -> None:
+        """Have `write` fill the elements' rows of all bodies' body frames (b, 7), twists (b, 6) and tensions (b,)."""
         nodes = self._nodes
-        write_elements(
-            self._first, nodes.x, nodes.q, nodes.v, nodes.w, self._inertial_to_body, self.tension, self._bodies,
-            poses, twists, tensions, self._scratch,
+        self._elements = Elements(
+            np.array([self._first]), nodes.x, nodes.q, nodes.v, nodes.w, self._inertial_to_body, self.tension,
+            self._bodies, poses, twists, tensions, np.zeros((3, 3)),
         )  # fmt: skip
+        self._element_table = table_of(self._elements)
+
+    def write(self) -> None:
+        """Write the elements' state to where `report_to` set."""
+        write_elements(self._element_table)
 
     @property
     def positions(self) -> Array:

@@ -209,7 +209,9 @@ class Rods:
         """Write poses, twists and tension of the elements of every rod into a state record."""
         fields = self._fields.of(state)
         for rod in self.rods:
-            rod.write(*fields)
+            if self._fields.fresh:
+                rod.report_to(*fields)
+            rod.write()
 
     def is_attached(self, body: int, element_body: int) -> bool:
         """Whether `attach` holds the element ``element_body`` to ``body``."""
