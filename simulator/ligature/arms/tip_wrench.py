@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ class TipWrench:
     def __init__(self, world: World, description: ArmDescription, bodies: Sequence[int], arm: Arm) -> None:
         self._world, self._base, self._bodies, self._arm = world, description.base, tuple(bodies), arm
 
-    @property
+    @cached_property
     def group(self) -> int:
         """The bit in `ContactWrenches.felt` without which it is zero."""
         return self._world.wrenches.group(self._bodies)

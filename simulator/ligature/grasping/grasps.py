@@ -146,6 +146,12 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         name = self._scene.jaws[index].name
         return Held(name, held.body, grasp.normal_force, wrench, grasp.slipped.copy(), grasp.share())
 
+    def body_in(self, name: str) -> int:
+        """The body that a jaw holds, -1 for none; raises `UnknownNameError` for a name that no jaw has."""
+        index = self._index(name)
+        held = self._thread_grasps[index] or self._jaw_grasps[index]
+        return -1 if held is None else held.body
+
     def patch(self, name: str) -> Array:
         """Pose (4, 4) in world axes of the contact patch of a jaw, z normal to the pads, x along the fingers.
 

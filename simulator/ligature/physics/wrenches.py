@@ -58,5 +58,5 @@ def fixed_wrench(client: int, constraint: int, pose: Array, T_parent_frame: Arra
 
 def about(wrench: Array, origin: Array, point: Array) -> Array:
     """``wrench`` (6,) given about ``origin`` (3,), as seen about ``point`` (3,)."""
-    moment = wrench[3:] + np.cross(origin - point, wrench[:3])
-    return np.concatenate([wrench[:3], moment])
+    (fx, fy, fz, mx, my, mz), (x, y, z) = wrench.tolist(), (origin - point).tolist()  # np.cross takes ten times as long
+    return np.array([fx, fy, fz, mx + (y * fz - z * fy), my + (z * fx - x * fz), mz + (x * fy - y * fx)])

@@ -313,13 +313,16 @@ class Ghosts(Subsystem):
             _find_inside(self._table, ghost_world, body_pose, self.sensed)
 
     def _measure_pairs(self, ghost_world: Array) -> None:
-        for ghost in np.flatnonzero(self._due.any(axis=1)):
-            rows = np.flatnonzero(self._due[ghost])
+        due: dict[int, list[int]] = {}
+        for ghost, row in np.argwhere(self._due).tolist():
+            due.setdefault(ghost, []).append(row)
+        for ghost, rows in due.items():
             candidates = self._solid[rows].tolist()
-            gaps = np.array(self._queries.probe_gaps(self._probes[ghost], ghost_world[ghost], candidates, BAND))
-            self._inside[ghost, rows] = gaps <= 0.0
-            self._room[ghost, rows] = CONFIDENCE * np.minimum(np.abs(gaps), BAND)
-            self._measured[ghost, rows] = self._apart[ghost, rows]
+            gaps = self._queries.probe_gaps(self._probes[ghost], ghost_world[ghost], candidates, BAND)
+            for row, gap in zip(rows, gaps, strict=True):  # one by one: they are few, and rows of arrays take longer
+                self._inside[ghost, row] = gap <= 0.0
+                self._room[ghost, row] = CONFIDENCE * min(abs(gap), BAND)
+                self._measured[ghost, row] = self._apart[ghost, row]
 
 
 def _reach(colliders: tuple[Collider, ...]) -> float:

@@ -8,6 +8,7 @@ place. A sideways force above the strength tears the tissue: the puncture moves 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -166,15 +167,18 @@ class Holes:
             if self._mobile[p.hole[c]]:
                 self._bodies.apply_impulse(hole.body, self._reaction[:3], self._reaction[3:])
 
-    def _read_holes(self, holes: list[int]) -> None:
+    def _place_holes(self, holes: Iterable[int]) -> None:
+        """Put holes where their bodies were as all were read last."""
         sites = self._sites
         for hole in holes:
-            sites.pose[hole], sites.twist[hole] = self._bodies.motion(self._scene.holes[hole].body)
+            motion = self._search.motion[len(self._needles) + hole]
+            sites.pose[hole], sites.twist[hole] = motion[:7], motion[7:]
 
     def _follow(self) -> None:
         """Update all passages and drop those that have ended."""
         p, n = self._passages, int(self._passages.filled[0])
-        self._read_holes(sorted(set(p.hole[:n].tolist())))
+        self._bodies.read_motions(self._search.watched, self._search.motion)
+        self._place_holes(sorted(set(p.hole[:n].tolist())))
         self._sites.shared[:] = np.bincount(p.hole[:n], minlength=len(self._sites.shared))
         for path in sorted(set(p.path[:n].tolist())):
             if path < len(self._needles):
@@ -208,9 +212,9 @@ class Holes:
         self._passages.filled[0] = len(rows)
 
     def _read_needle(self, path: int) -> None:
-        """Read the motion of a needle and the forces on it in this tick, for the solve that moves it."""
-        body, bodies = self._scene.bodies[self._needles[path]], self._bodies
-        self._paths.pose[path], self._twist[path] = bodies.motion(body.index)
+        """Take the motion of a needle and the forces on it in this tick, for the solve that moves it."""
+        body, bodies, motion = self._scene.bodies[self._needles[path]], self._bodies, self._search.motion[path]
+        self._paths.pose[path], self._twist[path] = motion[:7], motion[7:]
         mass, inertia, self._pull[path] = bodies.attached_load(body.index)
         self._mass[path], self._inertia[path] = body.mass + mass, body.inertia + inertia
         self._pull[path, :3] += body.mass * body.gravity
@@ -273,7 +277,8 @@ class Holes:
         self._countdown[0], self._turn[0], self._looked = 0, -1, False
         self._near[:] = True
         self._gaps[:] = 0.0
-        self._read_holes(list(range(len(self._scene.holes))))
+        self._bodies.read_motions(self._search.watched, self._search.motion)
+        self._place_holes(range(len(self._scene.holes)))
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""

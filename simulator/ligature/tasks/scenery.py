@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.model.frames import pose7_matrix
+from ligature.model.frames import quaternion_matrix
 from ligature.model.scene import ArmKind, Scene
 
 Array = NDArray[np.float64]
@@ -62,8 +62,8 @@ class Scenery:
 
     def needle_points(self, body_pose: Array) -> Array:
         """Base, middle and tip (3, 3) of the needle with bodies at ``body_pose`` (bodies, 7)."""
-        T = pose7_matrix(body_pose[self.needle])
-        return np.asarray(self.points @ T[:3, :3].T + T[:3, 3])
+        pose = body_pose[self.needle]
+        return np.asarray(self.points @ quaternion_matrix(pose[3:]).T + pose[:3])
 
 
 def _pairs(scene: Scene) -> list[tuple[int, int]]:

@@ -193,8 +193,7 @@ class Goal:
 
 def holds(simulation: Simulation, arm: PsmArm, body: int) -> bool:
     """Whether the jaws of ``arm`` hold ``body`` between their pads."""
-    found = simulation.grasps[arm.name]
-    return found is not None and found.body == body
+    return simulation.grasps.body_in(arm.name) == body
 
 
 def tip_position(simulation: Simulation, arm: PsmArm) -> Array:

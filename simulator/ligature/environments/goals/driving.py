@@ -58,6 +58,7 @@ class Insert(Goal):
         simulation, arm = self._simulation, self._arms[0]
         self.arc = NeedleArc.of(simulation.scene.needles[0], simulation.scene.bodies[self.body])
         entry, exit = self._places = self._ends()
+        self._way = holes_of([1])
         self.throw = Throw.through(entry, exit, self.arc.radius, UP)
         self._pair = holes_at(simulation, entry, exit) if self.holes else set()
         self._last = self.throw.towards_exit + RECOMMENDED_AXIAL / self.arc.radius + self.MORE
@@ -96,12 +97,16 @@ class Insert(Goal):
         state = self._simulation.state
         poses, time = state["body_pose"][0], self._simulation.time
         self._watch.observe(time, poses)
-        score = judge_insertion(self.scenery, poses, self._watch.passages, time)
+        passed = passed_in_order(self._watch.passages, self._way)
         n = int(state["insertion_count"][0])
         filled = set(state["insertion_hole"][0, :n][state["insertion_body"][0, :n] == self.body].tolist())
-        through = score.success and score.pair == 1 and bool(score.axial >= RECOMMENDED_AXIAL)
-        entered = passed_in_order(self._watch.passages, holes_of([1])) / 2.0
-        return through and self._pair <= filled, bool(filled), entered
+        through = passed == len(self._way) and self._pair <= filled and self._is_beyond(poses, time)
+        return through, bool(filled), passed / len(self._way)
+
+    def _is_beyond(self, poses: Array, time: float) -> bool:
+        """Whether the tip, which has passed both holes, is far enough beyond the exit."""
+        score = judge_insertion(self.scenery, poses, self._watch.passages, time)
+        return score.success and bool(score.axial >= RECOMMENDED_AXIAL)
 
     def _on_circle(self, angle: float) -> Array:
         local = self.arc.radius * np.array([math.cos(angle), math.sin(angle), 0.0])
