@@ -301,3 +301,12 @@ def test_weights_on_springs_sleep_at_their_sag_and_wake_when_touched(
         simulation.bodies["Ball0"].set_pose([0.0, 0.2, 0.05, 0, 0, 0, 1])
     settle()
     assert trees.joints[0] == pytest.approx(where, abs=1e-9)
+
+
+def test_holes_on_springs_sleep_among_bodies_of_another_gravity() -> None:
+    """With one arm, which has no gravity, most moving bodies of the scene are holes, which have."""
+    scene = ligature.load(ROOT / "scenes" / "suturing" / "launch.yaml", [0, 1, 4, 5])
+    simulation = Simulation(scene)
+    simulation.step(1000)
+    phantom = [scene.bodies[tree.root].identity.name for tree in simulation._world.engine.trees].index("Phantom")
+    assert _asleep(simulation)[phantom]

@@ -6,7 +6,6 @@ World axes, SI units; poses are x y z qx qy qz qw.
 from __future__ import annotations
 
 import weakref
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -53,13 +52,10 @@ NEAR = 0.002
 
 
 def common_gravity(scene: Scene) -> Array:
-    """The gravity (3,) that most moving bodies of trees share."""
+    """The gravity (3,) that all moving bodies of trees share; none where they differ: under Bullet's nothing sleeps."""
     members = [scene.bodies[link.body] for articulation in scene.articulations for link in articulation.links]
-    moving = [body for body in members if not body.static]
-    counts = Counter(tuple(b.gravity.tolist()) for b in moving)
-    if not counts:
-        return np.array(scene.world.gravity)
-    return np.array(max(counts, key=lambda g: (counts[g], g)))
+    found = {tuple(body.gravity.tolist()) for body in members if not body.static} or {tuple(scene.world.gravity)}
+    return np.array(found.pop() if len(found) == 1 else (0.0, 0.0, 0.0))
 
 
 class Engine:
