@@ -19,7 +19,6 @@ from tests.fuzz.readers import READERS, Reader, Refused, attempt
 from tests.fuzz.run import READERS as CAMPAIGN
 from tests.fuzz.run import run
 
-
 EACH = 20
 """Files of each kind."""
 
