@@ -17,9 +17,11 @@ from . import making
 from .compat import custom_properties
 from .ligature.adf.frames import axis_rotation, frame, rpy_matrix
 from .ligature.authoring.shapes import Shape
+from .mesh_reading import points_of
 from .placing import place
 from .poses import rest_pose
 from .references import topic_name
+from .solids import own_solid
 
 ROLES = ("NONE", "RIGID_BODY", "GHOST_OBJECT", "CONSTRAINT", "COLLISION_SHAPE")
 COLLISIONS = ("MESH", "SINGULAR_SHAPE", "COMPOUND_SHAPE")
@@ -190,7 +192,7 @@ def _adopt_shaped(obj: bpy.types.Object, name: str, namespace: str, role: str, d
     making.give_role(obj, ours, done.collection)
     group = getattr(obj.adf, ours.lower())
     group.name = topic_name(name)
-    obj.adf.key = making.free_key(done.collection, ours, name)
+    _give_key(obj, ours, name, done)
     if namespace and namespace != done.collection.adf.model.namespace:
         group.namespace = namespace
     if role == "BLENDER_BODY":
@@ -203,6 +205,12 @@ def _adopt_shaped(obj: bpy.types.Object, name: str, namespace: str, role: str, d
         done.left += [f"'{obj.name}': {left}" for left in stored.left() if not _internal(left)]
     done.bodies += ours == "BODY"
     done.ghosts += ours == "GHOST_OBJECT"
+
+
+def _give_key(obj: bpy.types.Object, role: str, name: str, done: Adopted) -> None:
+    """Identify an object by its name in the file, which is that in Blender without the namespace."""
+    obj.adf.key = ""  # its own is no reason to number it
+    obj.adf.key = making.free_key(done.collection, role, name)
 
 
 def _internal(name: str) -> bool:
@@ -298,7 +306,7 @@ def _owner(obj: bpy.types.Object, stored: Stored, ours: str) -> None:
 def _blender_body(obj: bpy.types.Object, group: bpy.types.PropertyGroup, done: Adopted) -> None:
     """Keys of a rigid body of Blender."""
     own = obj.rigid_body
-    group.mass = 0.0 if own.type == "PASSIVE" or own.kinematic else own.mass
+    group.mass = 0.0 if own.type == "PASSIVE" or own.kinematic or not own.enabled else own.mass
     group.friction_static, group.restitution = own.friction, own.restitution
     group.damping_linear, group.damping_angular = own.linear_damping, own.angular_damping
     if own.use_margin:
@@ -306,24 +314,27 @@ def _blender_body(obj: bpy.types.Object, group: bpy.types.PropertyGroup, done: A
     groups = [str(i) for i, on in enumerate(own.collision_collections) if on]
     if groups not in ([], ["0"]):
         group.collision_groups = ", ".join(groups)
-    if own.collision_shape in BLENDER_SHAPES and obj.type == "MESH":
+    if own.collision_shape in BLENDER_SHAPES and obj.type == "MESH" and not len(points_of(own_solid(obj))[0]):
+        done.left.append(f"'{obj.name}': its {own.collision_shape.lower()}, since its mesh has no face")
+    elif own.collision_shape in BLENDER_SHAPES and obj.type == "MESH":
         making.add_shape(obj, *_fitted(obj, BLENDER_SHAPES[own.collision_shape]))
         done.shapes += 1
         done.guessed.append(f"'{obj.name}': its {own.collision_shape.lower()} has the size of its mesh's bounding box")
     else:
         group.collision_mesh_type = "CONVEX_HULL" if own.collision_shape == "CONVEX_HULL" else "CONCAVE_MESH"
+    if own.collision_shape == "COMPOUND":
+        done.guessed.append(f"'{obj.name}' is a compound of its children; it collides by its own mesh here")
     if own.kinematic:
         done.guessed.append(f"'{obj.name}' is animated in Blender and stands still here")
 
 
 def _fitted(obj: bpy.types.Object, kind: str) -> tuple[Shape, str, np.ndarray]:
     """The primitive of a kind with the extents of a mesh, along Z as in Blender."""
-    corners = np.array([list(corner) for corner in obj.bound_box], dtype=float)
-    size, middle = np.ptp(corners, axis=0), corners.mean(axis=0)
+    points = points_of(own_solid(obj))[0]
+    size, middle = np.ptp(points, axis=0), (points.min(axis=0) + points.max(axis=0)) / 2.0
     radius = float(size.max() if kind == "SPHERE" else max(size[:2])) / 2.0
-    return (
-        Shape(kind, tuple(float(v) for v in size), radius, float(size[2])), "COLLISION", frame(np.eye(3), middle)
-    )  # fmt: skip
+    height = max(float(size[2]), 2.0 * radius if kind == "CAPSULE" else 0.0)
+    return Shape(kind, tuple(float(v) for v in size), radius, height), "COLLISION", frame(np.eye(3), middle)
 
 
 # --- joints -----------------------------------------------------------------------------------
@@ -390,8 +401,14 @@ def _adopt_blender_joint(obj: bpy.types.Object, name: str, done: Adopted) -> Non
     """Make a joint of a rigid-body constraint of Blender; the object that has it may be a body itself."""
     own = obj.rigid_body_constraint
     ends = [own.object1, own.object2]
-    if own.type not in BLENDER_JOINTS or any(end is None or end.adf.role != "BODY" for end in ends):
-        done.left.append(f"'{obj.name}': a constraint of type {own.type.lower()} without both bodies")
+    why = (
+        "is switched off" if not own.enabled
+        else f"is of type {own.type.lower()}, which has no joint in the format" if own.type not in BLENDER_JOINTS
+        else "has not both bodies" if any(end is None or end.adf.role != "BODY" for end in ends)
+        else ""
+    )  # fmt: skip
+    if why:
+        done.left.append(f"'{obj.name}': its constraint {why}")
         return
     kind = BLENDER_JOINTS[own.type]
     joint = obj
@@ -403,13 +420,21 @@ def _adopt_blender_joint(obj: bpy.types.Object, name: str, done: Adopted) -> Non
     _make_joint(joint, name, kind, ends, "Z", done, turned=False)
     group = joint.adf.joint
     if kind == "revolute" and own.use_limit_ang_z:
-        group.joint_limits_low, group.joint_limits_high = own.limit_ang_z_lower, own.limit_ang_z_upper
+        group.joint_limits_low, group.joint_limits_high = turned_limits(own.limit_ang_z_lower, own.limit_ang_z_upper)
     if kind == "prismatic" and own.use_limit_lin_x:
         group.joint_limits_low, group.joint_limits_high = own.limit_lin_x_lower, own.limit_lin_x_upper
     if kind.startswith("six dof"):
         _blender_six(group, own, kind)
     if not own.disable_collisions:
         group.ignore_inter_collision = False
+
+
+def turned_limits(low: float, high: float) -> tuple[float, float]:
+    """Limits of a rotation by the right-hand rule, which Blender states by the left-hand one, as Bullet counts it.
+
+    Those of a piston are right-handed in Blender too.
+    """
+    return 0.0 - high, 0.0 - low
 
 
 def _blender_six(group: bpy.types.PropertyGroup, own: bpy.types.RigidBodyConstraint, kind: str) -> None:
@@ -425,6 +450,8 @@ def _blender_six(group: bpy.types.PropertyGroup, own: bpy.types.RigidBodyConstra
                 if limited
                 else (1.0, -1.0)
             )
+            if half == "angular" and limited and own.type != "PISTON":
+                low, high = turned_limits(low, high)
             setattr(group, f"joint_limits_{half}_low_{axis}", low)
             setattr(group, f"joint_limits_{half}_high_{axis}", high)
             if kind == "six dof spring":
@@ -444,7 +471,8 @@ def _make_joint(
         if kind == "prismatic":
             T = T @ frame(axis_rotation((0.0, 1.0, 0.0), -np.pi / 2), (0.0, 0.0, 0.0))  # it slides along its X
     making.give_role(obj, "JOINT", done.collection)
-    obj.adf.key, obj.adf.joint.name = making.free_key(done.collection, "JOINT", name), name
+    _give_key(obj, "JOINT", name, done)
+    obj.adf.joint.name = name
     obj.adf.joint.type = kind
     obj.adf.parent_object, obj.adf.child_object = ends
     making.parent_in_place(obj, ends[0], T)

@@ -5,7 +5,7 @@ from pathlib import Path
 import bpy
 
 from . import making
-from .export_checks import deleted_end, deleted_owner, notes_of
+from .export_checks import TRIANGLES, deleted_end, deleted_owner, notes_of, unit_notes
 from .ligature.adf import AdfError, Resolver
 from .ligature.adf.diagnostics import Severity
 from .ligature.adf.reader import read_text
@@ -90,8 +90,9 @@ def _unwritten(obj):
     elif not obj.adf.was:  # its mesh file, which tells the rules of files, is not written yet
         for note in notes_of(obj):
             message, _, hint = f"it {note}".partition("; ")
-            fix = {"collision mesh type": "CONVEX_HULL"}
-            yield Finding("concave-moving", Severity.WARNING, obj.adf.key, message, hint, fix)
+            concave = note == TRIANGLES
+            rule, fix = ("concave-moving", {"collision mesh type": "CONVEX_HULL"}) if concave else ("not-as-seen", None)
+            yield Finding(rule, Severity.WARNING, obj.adf.key, message, hint, fix)
 
 
 def _references_to_deleted(collection, objects, obj):
@@ -115,10 +116,9 @@ def _references_to_deleted(collection, objects, obj):
 
 def _units(scene):
     """A finding for a unit scale other than 1, since lengths are written in metres."""
-    units = scene.unit_settings
-    if units.system != "NONE" and abs(units.scale_length - 1.0) > 1e-6:
-        message = f"its unit scale is {units.scale_length:g}, and lengths are written as metres"
-        yield Finding("unit-scale", Severity.WARNING, "", message, "set it to 1 and apply the scale to the objects")
+    for note in unit_notes(scene):
+        message, _, hint = note.partition("; ")
+        yield Finding("unit-scale", Severity.WARNING, "", message, hint)
 
 
 def _unplaced(obj):

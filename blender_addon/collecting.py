@@ -56,7 +56,7 @@ def collecting(collection: bpy.types.Collection, with_meshes: bool = False) -> S
     has_meshes = any(has_mesh(obj) for obj in objects)
     meshes = []
     if with_meshes and kind == "model":
-        meshes = yield from part(mesh_sources(objects, words), 0.5, 1.0)
+        meshes = yield from part(mesh_sources(objects, words, own_files(stored)), 0.5, 1.0)
     return Collected(
         kind,
         stored.source,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import bpy
 
-from .materials import Textures
+from .materials import Textures, changed_textures, texture_names
 from .mesh_reading import mesh_print, surfaces_of
 from .mesh_source import HIGH, LOW, MeshSource
 from .poses import SHAPED
@@ -19,8 +21,11 @@ def has_mesh(obj: bpy.types.Object) -> bool:
     return obj.adf.role in SHAPED and obj.type == "MESH"
 
 
-def mesh_sources(objects: list[bpy.types.Object], words: str) -> Steps[list[MeshSource]]:
-    """The steps to the meshes of all objects, the triangles of those alone whose files have to be written."""
+def mesh_sources(objects: list[bpy.types.Object], words: str, own_files: Collection[str]) -> Steps[list[MeshSource]]:
+    """The steps to the meshes of all objects, the triangles of those alone whose files have to be written.
+
+    ``own_files`` are those that the collection was opened from or wrote.
+    """
     shaped = [obj for obj in objects if obj.adf.role in SHAPED]
     own = {obj.name_full: _own(obj) for obj in shaped}
     solids = {obj.name_full: solids_of(obj) for obj in shaped}
@@ -30,6 +35,7 @@ def mesh_sources(objects: list[bpy.types.Object], words: str) -> Steps[list[Mesh
         prints[name] = mesh_print(parts)
     groups = {o.name_full: getattr(o.adf, o.adf.role.lower()) for o in bpy.data.objects if o.adf.role in SHAPED}
     names = {name: {g.mesh.lower(), g.collision_mesh.lower()} for name, g in groups.items()}
+    pictures = texture_names()
     written: set[str] = set()
     found = []
     for obj in shaped:
@@ -43,8 +49,10 @@ def mesh_sources(objects: list[bpy.types.Object], words: str) -> Steps[list[Mesh
             # a file that looks the same for all who use it is changed for all of them
             source.taken = set().union(*(used for name, used in names.items() if prints.get(name) != now))
             whole = obj.type == "MESH" and (now not in written or bool(source.mesh))
-            _read_triangles(source, solids[obj.name_full], whole)
+            _read_triangles(source, solids[obj.name_full], whole, Textures(pictures))
             written |= {now} if obj.type == "MESH" else set()
+        elif obj.type == "MESH":
+            source.textures = changed_textures(obj, pictures, own_files)
         found.append(source)
     return found
 
@@ -64,9 +72,8 @@ def _own(obj: bpy.types.Object) -> dict:
     }
 
 
-def _read_triangles(source: MeshSource, solids: list[Solid], whole: bool) -> None:
+def _read_triangles(source: MeshSource, solids: list[Solid], whole: bool, textures: Textures) -> None:
     """Read the triangles of an object, where it has them and needs a file of its own, and of its convex parts."""
-    textures = Textures()
     source.changed = True
     if whole:
         source.surfaces = surfaces_of(solids[0], textures)

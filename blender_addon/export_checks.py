@@ -9,8 +9,10 @@ import bpy
 
 from .collected import Part
 from .ligature.adf.references import merged
-from .poses import SHAPED, children_with, shapes_of
+from .poses import SHAPED, children_with, scene_of, shapes_of
 from .references import file_of, members, owner_of, qualified
+
+TRIANGLES = "moves and collides as a triangle mesh; decompose it into convex pieces, or fit primitives"
 
 
 class ExportError(Exception):
@@ -37,6 +39,8 @@ def check_parts(collection: bpy.types.Collection, objects: list[bpy.types.Object
         else:
             _check_joint(collection, objects, obj, part)
     notes = [f"'{obj.name}' {note}" for obj in objects for note in notes_of(obj)]
+    scenes = {obj: scene_of(obj) for obj in objects if not obj.adf.was}
+    notes += [f"'{scene.name}': {note}" for scene in dict.fromkeys(scenes.values()) for note in unit_notes(scene)]
     return notes + [
         f"'{obj.name}' was moved, and joins a body that is not open: its pose in the file stays"
         for obj, part in zip(objects, parts, strict=True)
@@ -125,13 +129,59 @@ def _keeps_pose(part: Part) -> bool:
 
 def notes_of(obj: bpy.types.Object) -> list[str]:
     """What surprises about an object that is not in the file yet."""
-    if obj.adf.was or obj.adf.role not in SHAPED:
+    if obj.adf.was:
         return []
+    if obj.adf.role in SHAPED:
+        return [note for note in (_shape_note(obj), _instances_note(obj)) if note]
+    maker = {("CAMERA", "CAMERA"): _camera_notes, ("LIGHT", "LIGHT"): _light_notes}.get((obj.adf.role, obj.type))
+    return maker(obj) if maker else []
+
+
+def unit_notes(scene: bpy.types.Scene) -> list[str]:
+    """What surprises about the units of a scene: lengths are written in metres."""
+    units = scene.unit_settings
+    if units.system == "NONE" or abs(units.scale_length - 1.0) <= 1e-6:
+        return []
+    return [
+        f"its unit scale is {units.scale_length:g}, and lengths are written as metres; "
+        "set it to 1 and apply the scale to the objects"
+    ]
+
+
+def _shape_note(obj: bpy.types.Object) -> str:
     if obj.type not in ("MESH", "EMPTY"):
-        return [f"is a {obj.type.lower()}, whose shape is not written; convert it to a mesh"]
+        return f"is a {obj.type.lower()}, whose shape is not written; convert it to a mesh"
     if obj.adf.role == "BODY" and obj.type == "MESH" and collides_as_triangles(obj):
-        return ["moves and collides as a triangle mesh; decompose it into convex pieces, or fit primitives"]
-    return []
+        return TRIANGLES
+    return ""
+
+
+def _instances_note(obj: bpy.types.Object) -> str:
+    seen = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()) if obj.visible_get() else obj
+    shows = (obj.instance_type in ("VERTS", "FACES") and obj.children) or any(
+        system.settings.render_type in ("OBJECT", "COLLECTION") for system in obj.particle_systems
+    )
+    if shows or (any(modifier.type == "NODES" for modifier in obj.modifiers) and seen.is_instancer):
+        return "shows instances, which are not written; use Object > Apply > Make Instances Real, and join them"
+    return ""
+
+
+def _camera_notes(obj: bpy.types.Object) -> list[str]:
+    camera, notes = obj.data, []
+    if camera.type == "PANO" or (camera.type == "ORTHO" and not obj.adf.camera.orthographic_view_width):
+        kind = {"PANO": "panoramic", "ORTHO": "orthographic"}[camera.type]
+        hint = {"PANO": "make it one", "ORTHO": "set its Orthographic View Width in the Physics tab"}[camera.type]
+        notes.append(f"is {kind}, and is written as a perspective camera; {hint}")
+    if camera.shift_x or camera.shift_y:
+        notes.append("is shifted, which the format does not have; turn it instead")
+    return notes
+
+
+def _light_notes(obj: bpy.types.Object) -> list[str]:
+    if obj.data.type == "SPOT":
+        return []
+    kind = {"SUN": "sun", "AREA": "area light", "POINT": "point light"}.get(obj.data.type, obj.data.type.lower())
+    return [f"is a {kind}, and is written as a spot light at its place; make it a spot to see its cone"]
 
 
 def collides_as_triangles(obj: bpy.types.Object) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import os
+from collections.abc import Collection
 from pathlib import Path
 
 from .ligature.authoring.objfile import Paint, Surface, obj_texts
@@ -19,7 +20,8 @@ class MeshFiles:
     """The mesh files of the model at ``path``, and the keys that name them.
 
     Files are those of changed meshes, and of unchanged ones when the model goes to another folder. All of them lie
-    below ``root``: where the model names a folder outside, another is named. ``old`` are the files that it had.
+    below ``root``: where the model names a folder outside, another is named. ``old`` are the files that it had, ``own``
+    those that it was opened from or wrote: of pictures among them the copies are renewed, also of unchanged meshes.
 
     Attributes
     ----------
@@ -29,7 +31,9 @@ class MeshFiles:
         Keys of the model itself that name other folders.
     """
 
-    def __init__(self, sources: list[MeshSource], old: OldMeshes, path: Path, root: Path) -> None:
+    def __init__(
+        self, sources: list[MeshSource], old: OldMeshes, path: Path, root: Path, own: Collection[str] = ()
+    ) -> None:
         self.keys: dict[str, dict] = {}
         self.top: dict[str, str] = {}
         self.files: Files = {}
@@ -46,6 +50,8 @@ class MeshFiles:
                 self._write(source)
             elif old.moves:
                 self._copy(source)
+            if not source.changed:
+                self._renew_pictures(source, own)
 
     def _inside(self, folder: Path) -> bool:
         return self._root in (folder.resolve(), *folder.resolve().parents)
@@ -99,6 +105,15 @@ class MeshFiles:
     def _add_companions(self, old: Path, folder: Path) -> None:
         for name, data in self._old.contents[old].items():
             self.files[joined(folder, name)] = data
+
+    def _renew_pictures(self, source: MeshSource, own: Collection[str]) -> None:
+        """Copy those of an unchanged mesh again that this model copied beside it before."""
+        folder, name = source.places[HIGH]
+        before = joined(self._old.folder, self._old.given[HIGH], folder, os.path.dirname(name))
+        target = self._place(HIGH, before) if self._old.moves else before
+        for picture, data in source.textures.items():
+            if str(before / picture) in own and self._inside(target):
+                self.files[target / picture] = data
 
     def _write(self, source: MeshSource) -> None:
         """The files of a changed mesh."""

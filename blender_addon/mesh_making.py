@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 
@@ -35,7 +37,7 @@ class MeshMaker:
 
     def _make(self, parts: tuple[MeshPart, ...], name: str, scale: float) -> bpy.types.Mesh:
         made = bpy.data.meshes.new(name)
-        welded = [_welded(part) for part in parts]
+        parts, welded = _welded(parts)
         vertices = np.vstack([v for v, _ in welded]) if welded else np.zeros((0, 3))
         first = np.cumsum([0] + [len(v) for v, _ in welded[:-1]]) if welded else []
         triangles = (
@@ -59,10 +61,19 @@ class MeshMaker:
         return self._materials[key]
 
 
-def _welded(part: MeshPart) -> tuple[np.ndarray, np.ndarray]:
-    """Merge vertices that differ only in normal or texture coordinate, so that faces share edges."""
-    vertices, inverse = np.unique(part.vertices.astype(np.float32), axis=0, return_inverse=True)
-    return vertices, inverse.reshape(-1)[part.faces].reshape(-1, 3)
+def _welded(parts: tuple[MeshPart, ...]) -> tuple[tuple[MeshPart, ...], list[tuple[np.ndarray, np.ndarray]]]:
+    """Merge vertices that differ only in normal or texture coordinate, so that faces share edges.
+
+    Triangles of which two corners are one place have no area and are left out of the parts: Blender crashes on them.
+    """
+    kept, welded = [], []
+    for part in parts:
+        vertices, inverse = np.unique(part.vertices.astype(np.float32), axis=0, return_inverse=True)
+        triangles = inverse.reshape(-1)[part.faces].reshape(-1, 3)
+        proper = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+        kept.append(replace(part, faces=part.faces[proper]))
+        welded.append((vertices, triangles[proper]))
+    return tuple(kept), welded
 
 
 def _fill(mesh: bpy.types.Mesh, vertices: np.ndarray, triangles: np.ndarray) -> None:

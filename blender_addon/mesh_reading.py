@@ -39,7 +39,6 @@ class _Evaluated:
         self.scene = bpy.data.scenes.new("ADF evaluation")
         self.copy = self.obj.copy()
         self.copy.hide_viewport = False
-        self.copy.parent = None
         if self.edited is not None:
             self.copy.data = self.edited
         self.scene.collection.objects.link(self.copy)

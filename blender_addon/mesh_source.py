@@ -32,7 +32,8 @@ class MeshSource:
     surfaces, hulls
         Triangles of the object, None where an equal mesh has them, and of each convex part.
     textures, problems
-        Pictures of its materials by the names of their files, and what could not be written of them.
+        Pictures of its materials by the names of their files, and what could not be written of them. Of an unchanged
+        object: those of which the collection's own files have copies.
     """
 
     key: str

@@ -6,7 +6,7 @@ excluded collections count like all others. Pure arithmetic is in `ligature.auth
 
 from __future__ import annotations
 
-from math import pi
+from math import atan, pi
 
 import bpy
 import numpy as np
@@ -25,12 +25,17 @@ FAR = 1e9
 
 def rest_matrix(obj: bpy.types.Object) -> np.ndarray:
     """World matrix (4, 4) of an object from its own transform and its parents'."""
-    if obj.constraints or obj.parent_type not in ("OBJECT", "ARMATURE", "LATTICE"):
+    if obj.constraints or obj.parent_type not in ("OBJECT", "ARMATURE", "LATTICE") or _on_path(obj):
         return np.array(obj.matrix_world, dtype=float)
     own = np.array(obj.matrix_basis, dtype=float)
     if obj.parent is None:
         return own
     return rest_matrix(obj.parent) @ np.array(obj.matrix_parent_inverse, dtype=float) @ own
+
+
+def _on_path(obj: bpy.types.Object) -> bool:
+    """Whether the parent is a curve that carries its children along."""
+    return obj.parent is not None and obj.parent.type == "CURVE" and obj.parent.data.use_path
 
 
 def rest_pose(obj: bpy.types.Object) -> np.ndarray:
@@ -107,13 +112,32 @@ def placed(obj: bpy.types.Object, names: tuple[str, ...]) -> Placed:
         T=T,
         reach=0.0 if obj.parent is None and not obj.constraints else _reach(T),
         far=0.0 if owner is None or role == "BODY" else max(_reach(own), _reach(rest_pose(owner))),
-        lens=(obj.data.angle_y, obj.data.clip_start, obj.data.clip_end)
+        lens=(opening_of(obj.data, scene_of(obj)), obj.data.clip_start, obj.data.clip_end)
         if (role, obj.type) == ("CAMERA",) * 2
         else None,
         cone=getattr(obj.data, "spot_size", pi) if (role, obj.type) == ("LIGHT",) * 2 else None,
         inertial=inertial_frame(obj) if shaped and children_with(obj, "INERTIAL") else None,
         shapes={use: _placed_shapes(obj, use) for use in ("COLLISION", "VISUAL")} if shaped else {},
     )
+
+
+def scene_of(obj: bpy.types.Object) -> bpy.types.Scene:
+    """The scene in which an object is seen."""
+    scenes = obj.users_scene
+    return bpy.context.scene if not scenes or bpy.context.scene in scenes else scenes[0]
+
+
+def opening_of(camera: bpy.types.Camera, scene: bpy.types.Scene) -> float:
+    """The vertical opening of a camera, in radians, as its pictures have it in a scene.
+
+    Blender states that of the sensor's height, which is the picture's only if the sensor is fitted to it.
+    """
+    if camera.sensor_fit == "VERTICAL":
+        return camera.angle_y
+    render = scene.render
+    width, height = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
+    upright = camera.sensor_fit == "AUTO" and height > width
+    return 2.0 * atan(0.5 * camera.sensor_width / camera.lens * (1.0 if upright else height / width))
 
 
 def _reach(T: np.ndarray) -> float:

@@ -87,7 +87,7 @@ def preparing(
         old = in_file(found)
         old_meshes = OldMeshes(found.meshes, found.top, path, before, Resolver.for_file(before or path, found.folders))
         yield words, 0.5 * (COLLECTED + 1.0)
-        meshes = MeshFiles(found.meshes, old_meshes, path, root)
+        meshes = MeshFiles(found.meshes, old_meshes, path, root, found.own)
         yield words, 0.75 + 0.25 * COLLECTED
         text = text_of(found, old, meshes.keys, {**meshes.top, **top})
         data = text.encode("utf-8") if text == found.source else checked_text(text, path)

@@ -49,7 +49,9 @@ class Surface:
 def obj_texts(surfaces: Sequence[Surface], library: str, name: str) -> tuple[str, str]:
     """OBJ and MTL text; ``library`` is the MTL file's name. Raises `MeshWriteError`."""
     if not any(len(s.triangles) for s in surfaces):
-        raise MeshWriteError(f"'{name}' has no face; an empty mesh file is of no use")
+        raise MeshWriteError(
+            f"'{name}' has no face, so that its file would be empty; give it faces, or make it an empty"
+        )
     lines = [f"mtllib {library}", f"o {_word(name)}"]
     counts = [1, 1, 1]
     written = [surface for surface in surfaces if len(surface.triangles)]

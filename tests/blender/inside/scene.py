@@ -4,8 +4,10 @@ import hashlib
 import json
 import os
 import random
+import subprocess
 
 import bpy
+import pytest
 
 
 def select(*objects):
@@ -52,6 +54,18 @@ def scene_print():
     report.append(sorted((c.name, len(c.objects)) for c in bpy.data.collections))
     report.append([len(bpy.data.meshes), len(bpy.data.materials), len(bpy.data.scenes)])
     return hashlib.sha256(json.dumps(report).encode()).hexdigest()
+
+
+def in_simulator(script, *paths):
+    """What a script prints as JSON of exported files, by Ligature's own Python; the test is skipped without one."""
+    python = os.environ.get("LIGATURE_PYTHON")
+    if python is None:
+        pytest.skip("set LIGATURE_PYTHON to a Python that has ligature")
+    environment = {**os.environ, "PYTHONPATH": os.path.join(os.environ["LIGATURE_ROOT"], "simulator")}
+    command = [python, "-c", script, *map(str, paths)]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=270, check=False)
+    assert done.returncode == 0, done.stderr[-4000:]
+    return json.loads(done.stdout.splitlines()[-1])
 
 
 def corpus_files(corpus):

@@ -1,8 +1,6 @@
 """Scenes of the original add-on and of Blender's own rigid bodies become models that state the same."""
 
-import json
-import os
-import subprocess
+import itertools
 from math import radians
 
 import bpy
@@ -12,10 +10,11 @@ from adf_studio.adopt_operators import REPORT
 from adf_studio.adopting import JOINTS, ROLES, adopt
 from adf_studio.ligature.adf import Resolver, read_any
 from adf_studio.ligature.authoring.placement import JointKeys, child_pose, joint_pose, matrix_of
-from adf_studio.poses import rest_pose
+from adf_studio.poses import rest_pose, scaling, shape_of
 from adf_studio.write_file import export_file
 
-from .scene import cube
+from .scene import cube, in_simulator, select
+from .trees import quaternion, random_tree, turned
 
 P = bpy.props
 ITEMS = {
@@ -176,14 +175,7 @@ print(json.dumps({"mass": {b.identity.name: b.mass for b in scene.bodies}, "star
 
 def simulated(file):
     """Masses, poses at the start and after 0.2 s, and joints of an exported file, by Ligature's own Python."""
-    python = os.environ.get("LIGATURE_PYTHON")
-    if python is None:
-        pytest.skip("set LIGATURE_PYTHON to a Python that has ligature")
-    environment = {**os.environ, "PYTHONPATH": os.path.join(os.environ["LIGATURE_ROOT"], "simulator")}
-    words = [python, "-c", SIMULATED, str(file)]
-    done = subprocess.run(words, capture_output=True, text=True, env=environment, check=False)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    return in_simulator(SIMULATED, file)
 
 
 def reopened(tmp_path):
@@ -251,7 +243,7 @@ def test_rigid_bodies_of_blender_become_bodies_and_joints(tmp_path):
     bpy.ops.rigidbody.constraint_add(type="HINGE")
     own = hinge.rigid_body_constraint
     own.object1, own.object2, own.use_limit_ang_z = table, arm, True
-    own.limit_ang_z_lower, own.limit_ang_z_upper = -0.5, 0.75
+    own.limit_ang_z_lower, own.limit_ang_z_upper = -0.5, 0.75  # left-handed, as Blender's own physics shows
     done = adopt(bpy.context.scene)
     assert (done.bodies, done.joints, done.shapes) == (2, 1, 1) and any("bounding box" in text for text in done.guessed)
     export_file(done.collection, tmp_path / "m.yaml")
@@ -262,7 +254,136 @@ def test_rigid_bodies_of_blender_become_bodies_and_joints(tmp_path):
     assert bodies["arm"].text("collision shape") == "BOX"
     joint = document.elements("joints")[0]
     assert joint.vector("parent axis") == (0.0, 0.0, 1.0) and joint.vector("child pivot") == (0.0, 0.0, -0.5)
-    assert (joint.number("joint limits.low"), joint.number("joint limits.high")) == (-0.5, 0.75)
+    assert (joint.number("joint limits.low"), joint.number("joint limits.high")) == (-0.75, 0.5)
+
+
+LIMITED = [f"{half}_{axis}" for half in ("lin", "ang") for axis in "xyz"]
+FREE = {"HINGE": ("ang_z",), "SLIDER": ("lin_x",), "PISTON": ("lin_x", "ang_x"), "GENERIC": LIMITED}
+"""Axes along or about which constraints of Blender move, of which the tests leave one."""
+
+
+def limited_pair(seed):
+    """A resting and a moving body with a constraint of one free axis, which gravity drives to an end of it.
+
+    Returns the moving body.
+    """
+    rng = np.random.default_rng(seed)
+    scene = bpy.context.scene
+    bpy.ops.rigidbody.world_add()
+    kind = str(rng.choice(list(FREE)))
+    free = str(rng.choice(FREE[kind]))
+    turn, origin = quaternion(rng), rng.uniform(-1.0, 1.0, 3)
+    R = np.array(turn.to_matrix())
+    arm = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.6, 1.0, 3)
+    pair = []
+    for name, place, sort in (("rest", origin, "PASSIVE"), ("moves", origin + R @ arm, "ACTIVE")):
+        obj = cube(name, 0.1, place)
+        turned(obj, rng)
+        bpy.ops.rigidbody.object_add(type=sort)
+        own = obj.rigid_body
+        own.collision_shape, own.use_deactivation, own.restitution = "BOX", False, 0.0
+        own.linear_damping = own.angular_damping = 0.5
+        pair.append(obj)
+    pin = bpy.data.objects.new("pin", None)
+    scene.collection.objects.link(pin)
+    pin.location, pin.rotation_mode, pin.rotation_quaternion = origin, "QUATERNION", turn
+    select(pin)
+    bpy.ops.rigidbody.constraint_add(type=kind)
+    own = pin.rigid_body_constraint
+    own.object1, own.object2 = pair
+    for axis in LIMITED:
+        low, high = -rng.uniform(0.1, 0.3), rng.uniform(0.4, 0.8)
+        ends = (low, high) if rng.random() < 0.5 else (-high, -low)
+        setattr(own, f"use_limit_{axis}", True)
+        for end, value in zip(("lower", "upper"), ends if axis == free else (0.0, 0.0), strict=True):
+            setattr(own, f"limit_{axis}_{end}", float(value))
+    along = R[:, "xyz".index(free[-1])]
+    pull = along if free.startswith("lin") else np.cross(along, R @ arm)
+    pull = rng.choice([-1.0, 1.0]) * pull / np.linalg.norm(pull) + rng.uniform(-0.3, 0.3, 3)
+    scene.gravity = (9.8 * pull / np.linalg.norm(pull)).tolist()
+    bpy.context.view_layer.update()
+    return pair[1]
+
+
+SETTLE = """
+import json, sys
+import ligature
+found = []
+for path in sys.argv[1:]:
+    simulation = ligature.Simulation(ligature.load(path))
+    index = next(body.index for body in simulation.scene.bodies if body.identity.name == "moves")
+    simulation.step(10000)
+    found.append(simulation.state[0]["body_pose"][index, :3].tolist())
+    simulation.close()
+print(json.dumps(found))
+"""
+
+
+def test_adopted_joints_stop_where_blender_s_own_physics_stops_them(tmp_path):
+    paths, expected = [], []
+    for seed in range(16):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        body = limited_pair(seed)
+        for frame in range(1, 241):
+            bpy.context.scene.frame_set(frame)
+        body = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        expected.append(np.array(body.matrix_world)[:3, 3])
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        limited_pair(seed)
+        adopt(bpy.context.scene).collection.adf.model.gravity = bpy.context.scene.gravity
+        paths.append(tmp_path / str(seed) / "launch.yaml")
+        bpy.ops.adf.export_scene(filepath=str(paths[-1]))
+    found = in_simulator(SETTLE, *paths)
+    for seed, place, wanted in zip(range(16), found, expected, strict=True):
+        np.testing.assert_allclose(place, wanted, atol=0.01, err_msg=str(seed))
+
+
+SHAPES_OF_BLENDER = ("BOX", "SPHERE", "CAPSULE", "CYLINDER", "CONE")
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_rigid_bodies_keep_names_masses_and_sizes(seed):
+    rng = np.random.default_rng(seed)
+    objects = [obj for obj in random_tree(seed, modifiers=False) if obj.type == "MESH"]
+    masses, sizes = {}, {}
+    for obj in objects:
+        select(obj)
+        bpy.ops.rigidbody.object_add()
+        own = obj.rigid_body
+        own.type = str(rng.choice(["ACTIVE", "PASSIVE"]))
+        own.mass, own.collision_shape = float(rng.uniform(0.1, 5.0)), str(rng.choice(SHAPES_OF_BLENDER))
+        own.kinematic, own.enabled = bool(rng.random() < 0.2), bool(rng.random() < 0.8)
+        masses[obj] = own.mass if own.type == "ACTIVE" and own.enabled and not own.kinematic else 0.0
+        points = np.array([vertex.co for vertex in obj.data.vertices]) @ scaling(obj)[:3, :3].T
+        sizes[obj] = np.ptp(points, axis=0)
+    constraints = []
+    for number, (one, other) in enumerate(itertools.pairwise(objects)):
+        pin = bpy.data.objects.new(f"pin{number}", None)
+        bpy.context.scene.collection.objects.link(pin)
+        select(pin)
+        bpy.ops.rigidbody.constraint_add(type=str(rng.choice(["FIXED", "POINT", "HINGE", "MOTOR"])))
+        own = pin.rigid_body_constraint
+        own.object1, own.object2, own.enabled = one, other, bool(rng.random() < 0.7)
+        constraints.append(own)
+    wanted = sum(own.enabled and own.type != "MOTOR" for own in constraints)
+    done = adopt(bpy.context.scene)
+    assert (done.bodies, done.joints, len(done.left)) == (len(objects), wanted, len(constraints) - wanted)
+    for own in constraints:
+        if not own.enabled:
+            assert f"'{own.id_data.name}': its constraint is switched off" in done.left
+    for obj, mass in masses.items():
+        assert obj.adf.key == f"BODY {obj.name.rpartition('/')[2]}"
+        assert obj.adf.body.mass == pytest.approx(mass)
+        shape = shape_of(next(child for child in obj.children if child.adf.role == "SHAPE"))
+        width = max(sizes[obj] if shape.kind == "SPHERE" else sizes[obj][:2])
+        if shape.kind == "BOX":
+            stated, size = shape.size, sizes[obj]
+        elif shape.kind == "SPHERE":
+            stated, size = [shape.radius], [width / 2.0]
+        else:
+            least = width if shape.kind == "CAPSULE" else 0.0
+            stated, size = [shape.radius, shape.height], [width / 2.0, max(sizes[obj][2], least)]
+        np.testing.assert_allclose(stated, size, rtol=1e-4, atol=1e-6)
 
 
 def test_a_scene_without_either_is_refused():

@@ -1,14 +1,14 @@
 """A whole scene is made in an empty Blender by operators alone; it is written, read back and simulated."""
 
-import json
 import math
 import os
-import subprocess
 
 import bpy
 import numpy as np
 import pytest
 from adf_studio.ligature.adf import Resolver, Severity, read_any
+
+from .scene import in_simulator
 
 SIMULATE = """
 import json, sys, ligature
@@ -116,15 +116,7 @@ def test_a_scene_from_nothing_is_written_read_back_and_simulated(tmp_path):
 
 
 def check_simulation(target):
-    python = os.environ.get("LIGATURE_PYTHON")
-    if python is None:
-        pytest.skip("set LIGATURE_PYTHON to a Python that has ligature")
-    environment = {**os.environ, "PYTHONPATH": os.path.join(os.environ["LIGATURE_ROOT"], "simulator")}
-    done = subprocess.run(
-        [python, "-c", SIMULATE, str(target)], capture_output=True, text=True, env=environment, timeout=270
-    )
-    assert done.returncode == 0, done.stderr
-    report = json.loads(done.stdout.splitlines()[-1])
+    report = in_simulator(SIMULATE, target)
     assert report["errors"] == [] and report["ghosts"] == 2 and report["cameras"] == 3 and report["lights"] == 1
     for name, (_, end) in report["bodies"].items():
         assert np.isfinite(end).all(), name
