@@ -84,6 +84,8 @@ def main() -> int:
     arguments.add_argument("--camera", action="append", help="repeatable; by default cameraL and cameraR")
     arguments.add_argument("--no-cameras", action="store_true", help="motion alone")
     given = arguments.parse_args()
+    if given.episodes < 1 or given.seed < 0:
+        arguments.error("--episodes is at least 1, and --seed at least 0")
     cameras = () if given.no_cameras else tuple(given.camera or ("cameraL", "cameraR"))
     simulation = ligature.Simulation(ligature.load(SCENE))
     start, done, ended, stopped = simulation.snapshot(), 0, 0, 0

@@ -102,6 +102,8 @@ def main() -> int:
     )
     arguments.add_argument("--camera", action="append", default=[], help="repeatable; none by default")
     given = arguments.parse_args()
+    if given.episodes < 1 or given.seed < 0 or not 0.0 <= given.noise <= 1.0:
+        arguments.error("--episodes is at least 1, --seed at least 0, and --noise from 0 to 1")
     env, steps = SuturingEnv(given.task, max_steps=max(MOST, GOALS[given.task].steps)), phases(given.task)
     begin, done, ended, stopped = time.perf_counter(), 0, 0, 0
     try:
@@ -118,7 +120,7 @@ def main() -> int:
             except KeyboardInterrupt as interrupt:
                 (stopped,) = interrupt.args  # the signal
                 print("interrupted")
-    except (DatasetError, KeyError) as error:
+    except (DatasetError, KeyError, ValueError) as error:
         print(error)
         return 2
     print(f"{given.out}: {done} of {ended} demonstrations succeeded, in {time.perf_counter() - begin:.0f} s")

@@ -156,6 +156,12 @@ def main() -> int:
     arguments.add_argument("--seed", type=int, default=0)
     arguments.add_argument("--resume", action="store_true", help="go on after the last round that POLICY.npz has")
     given = arguments.parse_args()
+    counts = (given.workers, given.rounds, given.episodes, given.epochs, 1 if given.first is None else given.first)
+    if min(counts) < 1 or given.seed < 0 or not 0.0 <= given.noise <= 1.0:
+        arguments.error(
+            "--workers, --rounds, --episodes, --epochs and --first are at least 1, --seed is at least 0, and --noise "
+            "from 0 to 1"
+        )
     kept = given.policy.with_suffix(".npz")
     if given.resume and not kept.is_file():
         print(f"nothing to resume: no file {kept}")

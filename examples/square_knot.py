@@ -420,6 +420,8 @@ def main() -> int:
     arguments.add_argument("--seed", type=int, default=0, help="where the thread lies; 0 is the scene's own place")
     arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
     given = arguments.parse_args()
+    if given.seed < 0:
+        arguments.error("--seed is at least 0")
     simulation = ligature.Simulation(scattered(ligature.load(SCENE), given.seed))
     film = Film(simulation, given.out) if given.out else None
     score, stopped = operate(simulation, film.watch if film else lambda: None)

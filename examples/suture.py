@@ -370,6 +370,8 @@ def main() -> int:
     arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
     arguments.add_argument("--scene", type=Path, default=SCENE, help="launch file; launch_400006.yaml has other tools")
     given = arguments.parse_args()
+    if given.seed < 0:
+        arguments.error("--seed is at least 0")
     return perform(given, lambda simulation, film: operate(simulation, given.throws, film))
 
 

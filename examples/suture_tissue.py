@@ -293,6 +293,9 @@ def main() -> int:
     arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
     arguments.add_argument("--scene", type=Path, default=SCENE, help="launch file")
     given = arguments.parse_args()
+    lengths = (given.width, given.spacing, 0.001 if given.depth is None else given.depth)
+    if given.seed < 0 or not all(0.0 < length < 1.0 for length in lengths):
+        arguments.error("--seed is at least 0, and --width, --spacing and --depth are metres, above 0 and below 1")
     plan = Plan(given.stitches, given.width, given.spacing, given.depth)
     return perform(given, lambda simulation, film: operate(simulation, plan, film))
 

@@ -111,6 +111,8 @@ def main() -> int:
     arguments.add_argument("--epochs", type=int, default=200)
     arguments.add_argument("--seed", type=int, default=0)
     given = arguments.parse_args()
+    if given.epochs < 1 or given.seed < 0:
+        arguments.error("--epochs is at least 1, and --seed at least 0")
     try:
         observations, actions, episodes = demonstrations(given.folder)
     except (OSError, KeyError, ValueError) as error:

@@ -150,6 +150,8 @@ def main() -> int:
     arguments.add_argument("--seed", type=int, default=0)
     arguments.add_argument("--resume", action="store_true", help="go on from the checkpoint beside POLICY")
     given = arguments.parse_args()
+    if given.steps < 1 or given.jobs < 1 or given.seed < 0:
+        arguments.error("--steps and --jobs are at least 1, and --seed at least 0")
     torch.set_num_threads(1)
     vector = environments(given.task, given.jobs, given.seed)
     try:

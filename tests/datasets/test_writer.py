@@ -5,13 +5,17 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
 import ligature
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from ligature.datasets import DatasetError, DatasetWriter
+from ligature.datasets.store import episode_names, join, opened
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
@@ -189,6 +193,79 @@ def test_a_phase_that_was_not_announced_is_refused(simulation: ligature.Simulati
         DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), phases=("work",)) as writer,
     ):
         writer.sample("knit")
+
+
+ARRAYS = st.sampled_from([(), (1,), (3,), (4,), (2, 2), (0,), (2, 0)]).map(np.zeros)
+EXTRAS = st.dictionaries(
+    st.sampled_from(["state", "reward", "näh", "a b", "a/b", "", ".", "..", "a\0b", "\ud800"]) | st.text(max_size=8),
+    ARRAYS | st.sampled_from([0.5, "left", None, [[1.0], [1.0, 2.0]], 1j]),
+    max_size=2,
+)
+REMARKS = st.dictionaries(
+    st.sampled_from(["seed", "why", "task", "operator", "samples", "phases", "success", "rate"]),
+    st.integers() | st.floats() | st.text(max_size=8) | st.sampled_from([None, "a\0b", "\ud800", {}, [1], b"x", 1j]),
+    max_size=2,
+)
+
+
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(episodes=st.lists(st.tuples(st.lists(EXTRAS, max_size=4), REMARKS), max_size=3), remarks=REMARKS)
+def test_what_a_caller_adds_is_kept_or_refused_and_the_dataset_is_sound(
+    simulation: ligature.Simulation, tmp_path_factory: pytest.TempPathFactory, episodes: list, remarks: dict
+) -> None:
+    """Whatever is refused leaves the episode as it was, so that a caller who goes on has a dataset."""
+    path, counts = tmp_path_factory.mktemp("kept") / "a.h5", []
+    try:
+        writer = DatasetWriter(path, simulation, cameras=(), rate=1000.0, remarks=remarks)
+    except ValueError:
+        assert not path.exists()
+        return
+    with writer:
+        for extras, told in episodes:
+            count = 0
+            for extra in extras:
+                simulation.step(1)
+                with suppress(ValueError):
+                    count += writer.sample(extra=extra)
+            try:
+                writer.end_episode(True, **told)
+            except ValueError as error:
+                assert any(name in str(error) for name in told)
+                writer.end_episode(True)
+            counts += [count] if count else []
+    with opened(path) as file:
+        assert [file[name].attrs["samples"] for name in episode_names(file)] == counts
+        for name in episode_names(file):
+            assert all(len(array) == file[name].attrs["samples"] for array in file[name].get("extra", {}).values())
+
+
+@given(st.sets(st.integers(0, 200_000), min_size=2))
+def test_episodes_stay_in_order_however_many(numbers: set[int]) -> None:
+    names = [f"episode_{number:04d}" for number in sorted(numbers)]
+    assert episode_names(dict.fromkeys(names[::-1])) == names  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["cameraL", "/ambf/env/cameras/cameraL", "cameras/cameraL"])
+def test_a_camera_is_kept_by_its_own_name_however_it_is_asked_for(
+    simulation: ligature.Simulation, tmp_path: Path, name: str
+) -> None:
+    """Messages list cameras with their namespaces."""
+    with DatasetWriter(tmp_path / "a.h5", simulation, cameras=(name, "cameraL"), size=(16, 16), rate=100.0) as writer:
+        for _ in range(2):
+            simulation.step(10)
+            writer.sample()
+    with opened(tmp_path / "a.h5") as file:
+        assert list(file["episode_0000/cameras"]) == ["cameraL"]
+        assert file["episode_0000/cameras/cameraL/rgb"].shape == (2, 16, 16, 3)
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "/", "{0}", "{0}/."])
+def test_a_folder_is_no_dataset(simulation: ligature.Simulation, tmp_path: Path, name: str) -> None:
+    path = Path(name.format(tmp_path))
+    for ask in (lambda: DatasetWriter(path, simulation, cameras=()), lambda: opened(path), lambda: join(path)):
+        with pytest.raises(DatasetError, match="is a folder"):
+            ask()
+    assert list(tmp_path.iterdir()) == []
 
 
 FULL = """

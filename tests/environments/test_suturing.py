@@ -488,7 +488,13 @@ def test_a_closed_environment_reports_that_whatever_is_asked_of_it() -> None:
             ask()
 
 
-@pytest.mark.parametrize("action", [np.zeros(6), np.zeros(8), np.zeros((1, 7)), 0.0, None, ["a"] * 7, {}, [[0.0]] * 7])
+NO_ACTIONS = [
+    np.zeros(6), np.zeros(8), np.zeros((1, 7)), 0.0, None, ["a"] * 7, {}, [[0.0]] * 7,
+    *(np.zeros(7, kind) for kind in ("c16", "M8[s]", "m8[s]", "S1", "U1", "V4", [("x", "f4")])),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("action", NO_ACTIONS)
 def test_what_is_no_action_is_rejected(action: object) -> None:
     env = SuturingEnv("reach")
     env.reset(seed=1)

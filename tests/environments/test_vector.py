@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -134,6 +135,48 @@ def test_closing_ends_all_processes_also_after_one_was_killed() -> None:
             os.kill(pids[0], signal.SIGKILL)
         envs.close()
         assert all(gone(pid) for pid in pids)
+
+
+WRONG = st.sampled_from([(7,), (3, 7), (1, 7), (2, 6), (2, 8), (2,), (7, 2), (2, 1, 7), (), (0,), (0, 7)]).map(np.zeros)
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 2**31), wrong=WRONG | st.sampled_from([None, "left", {}, [[0.0] * 7, [0.0]], 1j]))
+def test_wrong_actions_of_a_vector_are_refused_before_anybody_acts(
+    vector: SuturingVectorEnv, seed: int, wrong: object
+) -> None:
+    """The next action is answered as if nothing had been."""
+    actions = actions_of(seed, 2)
+    seen = []
+    for disturbed in (False, True):
+        vector.reset(seed=seed)
+        vector.step(actions[0])
+        if disturbed:
+            with pytest.raises(ValueError, match="actions of 2 environments are 2 by 7 numbers"):
+                vector.step(wrong)
+        seen.append(vector.step(actions[1])[0])
+    assert np.array_equal(*seen)
+
+
+DREW = """
+from ligature.environments import SuturingEnv, make_vec
+if __name__ == "__main__":
+    env = SuturingEnv("pick", observation="image")
+    first = env.reset(seed=1)[0]
+    env.close()
+    envs = make_vec("pick", 2, observation="image")
+    seen = envs.reset(seed=[1, 2])[0]
+    envs.close()
+    assert (seen[0] == first).all() and (seen[1] != first).any()
+    print("drawn")
+"""
+
+
+def test_a_process_that_has_drawn_makes_environments_that_draw(tmp_path: Path) -> None:
+    """OpenGL does not work in a child that is forked then."""
+    (tmp_path / "drew.py").write_text(DREW)
+    done = subprocess.run([sys.executable, tmp_path / "drew.py"], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and done.stdout == "drawn\n", done.stderr[-2000:]
 
 
 MAKER = """

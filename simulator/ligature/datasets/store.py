@@ -64,7 +64,7 @@ class PartFile:
     """An HDF5 file that is called ``PATH.part`` until it is whole; raises OSError where it cannot be written."""
 
     def __init__(self, path: Path) -> None:
-        self._path, self._part = path, path.with_name(f"{path.name}.part")
+        self._path, self._part = path, path.parent / f"{path.name}.part"
         self._disk = _Disk(self._part, "w+")
         self.file = h5py.File(self._disk, "w")
 
@@ -99,6 +99,8 @@ class EpisodeStore:
 
     def __init__(self, path: Path, describe: Describe) -> None:
         self._path, self._describe, self._folder = path, describe, episode_folder(path)
+        if path.is_dir():
+            raise DatasetError(f"'{path}' is a folder; give the name of a file that does not exist")
         if path.exists():
             raise DatasetError(f"'{path}' exists already; choose another name")
         if self._folder.exists():
@@ -163,6 +165,10 @@ def join(path: Path) -> int:
     A dataset that is one file stays. Raises `DatasetError`, for which the dataset stays as it was.
     """
     folder = episode_folder(path)
+    try:
+        regular_file(path)
+    except OSError as error:
+        raise DatasetError(_unreadable(path, error)) from error
     whole = PartFile(path)
     try:
         with opened(path) as linked:
@@ -231,12 +237,12 @@ def damaged(path: Path) -> Iterator[None]:
 
 def episode_names(file: h5py.File) -> list[str]:
     """The episodes of a dataset, in their order."""
-    return sorted(name for name in file if name.startswith("episode_"))
+    return sorted((name for name in file if name.startswith("episode_")), key=lambda name: (len(name), name))
 
 
 def episode_folder(path: Path) -> Path:
     """Where the episodes of a dataset lie while it grows."""
-    return path.with_name(f"{path.name}.episodes")
+    return path.parent / f"{path.name}.episodes"
 
 
 def _name(number: int) -> str:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 import ligature
 from ligature.camera_simulation import Simulation
@@ -27,16 +28,25 @@ from ligature.paths import printable
 from ligature.process import signals_held
 
 if TYPE_CHECKING:  # datasets of motion need no OpenGL
+    from ligature.render.cameras import CameraHandle
     from ligature.render.target import Exposure
 
 FORMAT = "ligature dataset 2"
 DEPTH_UNIT = 1e-4
 """Metres of one step of depth: 0.1 mm, so that two bytes reach 6.5 m. 0 means background."""
 
+OWN = frozenset({
+    "format", "version", "scene", "rate", "phases", "activities", "gestures", "depth_unit", "closed", "success",
+    "samples",
+})  # fmt: skip
+"""Attributes that no remark may replace."""
+
 EARLY = 1e-6
 """Seconds before its time at which a sample is taken, for the rounding of simulated time."""
 
 JOINT_ROWS, POSE, TWIST, WRENCH = "position, velocity, effort", "x y z qx qy qz qw", "v w", "f t"
+
+Array = NDArray[np.float64]
 
 Value = tuple[str, Any, dict[str, Any]]
 """Name and value of what one sample has, and how `EpisodeRows.append` keeps it."""
@@ -87,16 +97,18 @@ class DatasetWriter:
         remarks: Mapping[str, float | int | str] | None = None,
     ) -> None:
         _check(rate, size, phases, gestures or {})
+        _check_texts({"task": task, **{f"phase {k}": phase for k, phase in enumerate(phases)}, **(remarks or {})})
         path = Path(path)
         self._path, self._simulation = path, simulation
         self._size, self._rate, self._period = size, rate, 1.0 / rate
-        self._cameras = {name: simulation.cameras[name] for name in cameras}
+        self._cameras = _named(simulation, cameras)
         self._phases, self._task = ("", *phases), task
         self._gestures, self._remarks = dict(gestures or {}), dict(remarks or {})
         self._watch, self._events = ActivityWatch(simulation.scene), EventWatch(simulation)
         self._episode: h5py.File | None = None
         self._rows: EpisodeRows | None = None
         self._exposures: dict[str, Exposure] = {}
+        self._shapes: dict[str, tuple[int, ...]] = {}
         self._samples, self._due, self._ended = 0, 0.0, False
         try:
             self._store = EpisodeStore(path, self._describe)
@@ -140,27 +152,47 @@ class DatasetWriter:
         """Take a sample if one is due; the first begins an episode. Returns whether a sample was taken.
 
         ``arms`` are those that do what ``phase`` names, by default all; ``extra`` are further numbers by name, such as
-        an environment's observation. Raises ValueError for a phase that was not announced.
+        an environment's observation, with the same names and shapes in each sample of an episode. Raises ValueError for
+        a phase that was not announced and for numbers that cannot be kept; the episode is then as before.
         """
         if phase not in self._phases:
             raise ValueError(f"unknown phase '{phase}'; choose one of {', '.join(self._phases[1:]) or 'none'}")
         time = self._simulation.time
         if self._episode is not None and time < self._due - EARLY:
             return False
+        extras = self._extras(extra or {})
         with self._writing():
             if self._episode is None:
                 self._begin(time)
+            self._shapes = {name: value.shape for name, value in extras.items()}
             assert self._rows is not None
             self._append_pictures()
             for name, value, options in self._values(phase, arms):
                 self._rows.append(name, value, **options)
-            for name, value in (extra or {}).items():
-                self._rows.append(f"extra/{name}", np.asarray(value, dtype=float), "f4", units="the caller's")
+            for name, value in extras.items():
+                self._rows.append(f"extra/{name}", value, "f4", units="the caller's")
             self._exposures = {name: camera.expose(self._size) for name, camera in self._cameras.items()}
             self._store.check()
         self._samples += 1
         self._due += self._period
         return True
+
+    def _extras(self, extra: Mapping[str, Any]) -> dict[str, Array]:
+        """The caller's numbers; ValueError for names and shapes that are not those of the samples before."""
+        found = {}
+        for name, value in extra.items():
+            if not isinstance(name, str) or not name.isprintable() or name in ("", ".", "..") or "/" in name:
+                raise ValueError(f"extra: {name!r} cannot be the name of an array; use letters, digits and _")
+            try:
+                found[name] = np.asarray(value, dtype=float)
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"extra: '{name}' is not an array of numbers: {error}") from error
+            if not found[name].size:
+                raise ValueError(f"extra: '{name}' is empty")
+        shapes = {name: value.shape for name, value in found.items()}
+        if self._episode is not None and shapes != self._shapes:
+            raise ValueError(f"extra: all samples of an episode have the arrays {self._shapes}, not {shapes}")
+        return found
 
     def _begin(self, time: float) -> None:
         self._episode = self._store.begin()
@@ -171,10 +203,12 @@ class DatasetWriter:
     def end_episode(self, success: bool, **remarks: float | int | str) -> None:
         """End the episode, with ``success`` and ``remarks`` as its attributes; from now on it is on the disk.
 
-        ``task`` among the remarks replaces that of the dataset. Without a sample there is none to end.
+        ``task`` among the remarks replaces that of the dataset. Without a sample there is none to end. Raises
+        ValueError for a remark that is neither a number nor a text; the episode goes on then.
         """
         if self._episode is None:
             return
+        _check_texts(remarks)
         with self._writing():
             assert self._rows is not None
             self._append_pictures()
@@ -291,7 +325,7 @@ class DatasetWriter:
             except (OSError, RuntimeError) as error:
                 self._ended = True
                 self._forget()
-                kept = f"; {self.count} episodes are whole" if self.count else ""
+                kept = f"; {self.count} episode{'s are' if self.count > 1 else ' is'} whole" if self.count else ""
                 try:
                     self._store.close(empty=False)
                 except (OSError, RuntimeError) as second:
@@ -308,6 +342,36 @@ class DatasetWriter:
             self.close()
         else:
             self.abandon()
+
+
+def _check_texts(remarks: Mapping[str, Any]) -> None:
+    """Raise ValueError for an attribute that HDF5 cannot keep, or that is one of the format's own."""
+    for name, value in remarks.items():
+        if name in OWN:
+            raise ValueError(f"'{name}' is set by the writer; give your remark another name")
+        if name == "task" and not isinstance(value, str):
+            raise ValueError(f"'task' is a {type(value).__name__}; it must be a text")
+        if not isinstance(value, bool | int | float | str | np.bool_ | np.number):
+            raise ValueError(f"'{name}' is a {type(value).__name__}; it must be a number or a text")
+        if isinstance(value, int) and not -(2**63) <= value < 2**64:
+            raise ValueError(f"'{name}' is {value}, which has more than 64 bits; give it as a text")
+        if isinstance(value, str) and not _is_kept(value):
+            raise ValueError(f"'{name}' is {value!r}, which no file can hold; leave out NUL and lone surrogates")
+
+
+def _is_kept(text: str) -> bool:
+    """Whether HDF5 gives a text back as it is."""
+    return "\0" not in text and not any("\ud800" <= letter <= "\udfff" for letter in text)
+
+
+def _named(simulation: Simulation, cameras: Sequence[str]) -> dict[str, CameraHandle]:
+    """Cameras by the last part of their names: arrays of a dataset lie under names without slashes."""
+    found: dict[str, CameraHandle] = {}
+    for name in cameras:
+        handle, short = simulation.cameras[name], name.rpartition("/")[2]
+        if found.setdefault(short, handle) is not handle:
+            raise ValueError(f"cameras: two are called '{short}'; a dataset can have one of them")
+    return found
 
 
 def _check(rate: float, size: tuple[int, int], phases: Sequence[str], gestures: Mapping[str, str]) -> None:
@@ -333,6 +397,7 @@ def _tissue(scene: Scene, tissue: TissueBody, state: Any) -> Iterator[Value]:
     """Nodes, forces and punctures of a body of tissue, in world axes."""
     names = [scene.bodies[other.body].identity.name for other in scene.tissues]
     own = names[tissue.index] if names.count(names[tissue.index]) == 1 else f"{names[tissue.index]}{tissue.index}"
+    own = own.replace("/", "_")
     k, places = tissue.index, {"dtype": "f4", "units": "m"}
     yield f"tissue/{own}/points", state["tissue_node"][tissue.rows], places
     yield f"tissue/{own}/wrench", state["tissue_wrench"][k], {"dtype": "f4", "units": "N, N m", "axes": WRENCH}

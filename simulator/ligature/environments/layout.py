@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
 ACTION = 7
 """Numbers of an arm's action."""
 
@@ -32,3 +37,18 @@ def angles(arms: int) -> list[int]:
     """Where a state observation has the angles of joints and jaws."""
     starts = [0, *(STATE + FURTHER * k for k in range(arms - 1))]
     return [start + angle for start in starts for angle in _ANGLES]
+
+
+def numbers_of(action: Any, shape: tuple[int, ...], what: str) -> NDArray[np.float64]:
+    """Actions as a new array of a shape; raises ValueError for what is none, with ``what`` it would be."""
+    try:
+        found = np.array(action)
+        if found.dtype.kind == "O":
+            found = found.astype(float)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{what}: {error}") from error
+    if found.dtype.kind not in "biuf":
+        raise ValueError(f"{what}, not of the type {found.dtype}")
+    if found.shape != shape:
+        raise ValueError(f"{what}, not of the shape {found.shape}")
+    return found.astype(float, copy=False)

@@ -161,7 +161,7 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
             ("task", task, tuple(GOALS)), ("action", action, ("cartesian", "joint")),
             ("observation", observation, ("state", "image", "both")), ("reward", reward, ("dense", "sparse")),
         ):  # fmt: skip
-            if value not in allowed:
+            if not isinstance(value, str) or value not in allowed:
                 raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{value}'")
         if (
             len(np.shape(size)) != 1
@@ -378,12 +378,7 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
     def _numbers_of(self, action: Any) -> Array:
         """An action as numbers from -1 to 1."""
         width = layout.action_width(len(self._arms))
-        try:
-            found = np.array(action, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"an action is {width} numbers: {error}") from error
-        if found.shape != (width,):
-            raise ValueError(f"an action is {width} numbers, not of the shape {found.shape}")
+        found = layout.numbers_of(action, (width,), f"an action is {width} numbers")
         found[np.isnan(found)] = 0.0
         return np.minimum(np.maximum(found, -1.0), 1.0)
 

@@ -16,6 +16,7 @@ import numpy as np
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode
 from gymnasium.vector.async_vector_env import AsyncState
 
+from ligature.environments.layout import numbers_of
 from ligature.environments.suturing import SuturingEnv
 
 AUTORESET = {"next step": AutoresetMode.NEXT_STEP, "same step": AutoresetMode.SAME_STEP, "off": AutoresetMode.DISABLED}
@@ -66,7 +67,9 @@ class SuturingVectorEnv(AsyncVectorEnv):
         if autoreset not in AUTORESET:
             raise ValueError(f"autoreset must be one of {', '.join(map(repr, AUTORESET))}, not {autoreset!r}")
         made = _Made(task, options, os.getpid())
-        super().__init__([made] * n, shared_memory=True, autoreset_mode=AUTORESET[autoreset])
+        super().__init__(
+            [made] * n, shared_memory=True, autoreset_mode=AUTORESET[autoreset], context=_start_method(options)
+        )
 
     def _check_spaces(self) -> None:
         with self._watched():
@@ -83,9 +86,12 @@ class SuturingVectorEnv(AsyncVectorEnv):
             return super().reset_wait(*args, **kwargs)
 
     def step_async(self, actions: Any) -> None:
-        """Send each environment its action."""
+        """Send each environment its action; raises ValueError, before any of them acts, for what is none."""
+        shape = self.action_space.shape
+        assert shape is not None
+        numbers = numbers_of(actions, shape, f"actions of {shape[0]} environments are {shape[0]} by {shape[1]} numbers")
         with self._watched():
-            super().step_async(actions)
+            super().step_async(numbers)
 
     def step_wait(self, *args: Any, **kwargs: Any) -> Any:
         """What all environments answer to their actions."""
@@ -149,6 +155,16 @@ class SuturingVectorEnv(AsyncVectorEnv):
             raise RuntimeError(
                 f"environment {failed[-1]} of {self.num_envs} raised {type(error).__name__}: {error}"
             ) from error
+
+
+def _start_method(options: dict[str, Any]) -> str | None:
+    """How to start the processes: by forking, the default on Linux, unless they draw and this process has drawn."""
+    draws = options.get("observation", "state") != "state" or options.get("render_mode") is not None
+    if not draws or multiprocessing.get_start_method() != "fork":
+        return None
+    from ligature.render.context import has_drawn
+
+    return "spawn" if has_drawn() else None
 
 
 def _how(status: int) -> str:

@@ -15,6 +15,11 @@ _process = 0
 """The process that made the first context."""
 
 
+def has_drawn() -> bool:
+    """Whether this process, or one that it was forked from, made a context: no child that it forks can draw then."""
+    return _process != 0
+
+
 def check_process() -> None:
     """Raise `RenderUnavailable` in a child that was forked after a context was made: drawing there would never end."""
     if _process not in (0, os.getpid()):

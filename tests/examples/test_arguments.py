@@ -1,0 +1,33 @@
+"""Numbers that no example can take are refused at once, with the options that they belong to."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+NUMBER = re.compile(r'add_argument\(\s*"(--\w+)",\s*type=(?:int|float)(?!, choices)')
+SCRIPTS = [path for path in sorted((ROOT / "examples").glob("*.py")) if NUMBER.search(path.read_text())]
+POSITIONAL = {
+    "record_dataset.py": ["a.h5"], "record_experts.py": ["a.h5"], "scale_out.py": ["reach", "a.onnx"],
+    "train_bc.py": ["a", "a.onnx"], "train_sac.py": ["reach", "a.onnx"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_a_negative_number_is_refused_before_anything_begins(script: Path, tmp_path: Path) -> None:
+    options = NUMBER.findall(script.read_text())
+    for option in options:
+        command = [sys.executable, str(script), *POSITIONAL.get(script.name, []), f"{option}=-1"]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=100, check=False)
+        if "ModuleNotFoundError" in done.stderr:
+            pytest.skip(done.stderr.splitlines()[-1])
+        output = done.stdout + done.stderr
+        assert done.returncode == 2 and option.lstrip("-") in output.splitlines()[-1], f"{option}: {output[-600:]}"
+        assert "Traceback" not in output
+    assert list(tmp_path.iterdir()) == []
