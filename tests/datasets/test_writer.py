@@ -221,16 +221,16 @@ def test_what_a_caller_adds_is_kept_or_refused_and_the_dataset_is_sound(
         assert not path.exists()
         return
     with writer:
-        for extras, told in episodes:
+        for extras, noted in episodes:
             count = 0
             for extra in extras:
                 simulation.step(1)
                 with suppress(ValueError):
                     count += writer.sample(extra=extra)
             try:
-                writer.end_episode(True, **told)
+                writer.end_episode(True, **noted)
             except ValueError as error:
-                assert any(name in str(error) for name in told)
+                assert any(name in str(error) for name in noted)
                 writer.end_episode(True)
             counts += [count] if count else []
     with opened(path) as file:

@@ -69,10 +69,10 @@ def path(rng):
 def test_what_something_else_than_an_object_carries_is_written_where_it_is_seen(tmp_path, seed, make):
     rng = np.random.default_rng(seed)
     how = make(rng)
-    holder = bpy.context.object
+    carrier = bpy.context.object
     obj = bpy.data.objects.new("carried", random_mesh(rng))
     bpy.context.scene.collection.objects.link(obj)
-    obj.location, obj.parent = rng.uniform(-1.0, 1.0, 3), holder
+    obj.location, obj.parent = rng.uniform(-1.0, 1.0, 3), carrier
     turned(obj, rng)
     for name, value in how.items():
         setattr(obj, name, value)
