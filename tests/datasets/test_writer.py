@@ -202,7 +202,7 @@ EXTRAS = st.dictionaries(
     max_size=2,
 )
 REMARKS = st.dictionaries(
-    st.sampled_from(["seed", "why", "task", "operator", "samples", "phases", "success", "rate"]),
+    st.sampled_from(["seed", "why", "task", "operator", "samples", "phases", "rate"]),
     st.integers() | st.floats() | st.text(max_size=8) | st.sampled_from([None, "a\0b", "\ud800", {}, [1], b"x", 1j]),
     max_size=2,
 )
