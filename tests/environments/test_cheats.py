@@ -23,7 +23,7 @@ OPENING = 48
 TABLE = Path(__file__).resolve().parents[2] / "docs" / "cheats.md"
 
 
-LONG = ("first_throw", "knot_tie")
+LONG = ("first_throw", "knot_tie", "suture")
 """Environments whose episodes take long to compute: the slow tests have them."""
 
 

@@ -98,6 +98,7 @@ def test_tables_of_a_throw_go_from_its_first_to_its_last_angle(throw: int) -> No
         assert all(looping.between(table, angle) == value for angle, value in table)
 
 
+@pytest.mark.slow
 def test_the_short_end_stands_where_the_right_arm_bends_it() -> None:
     """Without the yield of the scene's thread it springs back by tens of millimetres."""
     knotter = square_knot.Knotter(ligature.Simulation(ligature.load(square_knot.SCENE)))
