@@ -12,6 +12,9 @@ from hypothesis import strategies as st
 from ligature.environments.goals import FirstThrow, KnotTie
 from ligature.environments.goals.ligating import LYING, Ligating
 from ligature.environments.suturing import _scene
+from ligature.environments.tying import shorter
+from ligature.model.frames import frame
+from scipy.spatial.transform import Rotation
 
 from tests.tasks.test_knots import CENTRE, HITCHED, hitched
 
@@ -121,3 +124,13 @@ def test_a_scene_without_a_vessel_is_refused() -> None:
     with pytest.raises(ValueError, match="has no body 'Vessel' with a cylinder, or no thread"):
         FirstThrow(simulation, arms)  # type: ignore[arg-type]
     simulation.close()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_of_two_grasps_half_a_turn_apart_a_hand_takes_the_one_that_turns_it_less(seed: int) -> None:
+    tool, T = (frame(R, np.zeros(3)) for R in Rotation.random(2, random_state=seed).as_matrix())
+    turned = T @ frame(Rotation.from_euler("z", np.pi).as_matrix(), np.zeros(3))
+    found = shorter(T, tool)
+    assert min(np.abs(found - one).max() for one in (T, turned)) < 1e-12
+    least, *others = (Rotation.from_matrix(tool[:3, :3].T @ one[:3, :3]).magnitude() for one in (found, T, turned))
+    assert least <= min(others) + 1e-9

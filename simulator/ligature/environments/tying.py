@@ -75,6 +75,13 @@ def first_throw(hand: Hand, observation: Array) -> Iterator[Array]:
     yield from tier.hands[LEFT].stay(60, SHUT)
 
 
+def shorter(T: Array, tool: Array) -> Array:
+    """A pose (4, 4) for a tool, or that after half a turn about it: what is less of a turn from where it is now."""
+    if np.sum(T[:3, :2] * tool[:3, :2]) >= 0.0:  # what the cosine of the turn has of the axes that a half turn reverses
+        return T
+    return np.asarray(T * np.array([-1.0, -1.0, 1.0, 1.0]))
+
+
 class Tier:
     """Both hands, and the thread."""
 
@@ -152,9 +159,8 @@ class Tier:
         """
         points = self.goal.points()
         element = min(max(element, 1), len(points) - 2)
-        along = points[element + 1] - points[element - 1]
-        along = along if along @ self.hands[number].tool[:3, 0] > 0.0 else -along
-        return holding(way, along, points[element])
+        T = holding(way, points[element + 1] - points[element - 1], points[element])
+        return shorter(T, self.hands[number].tool)
 
     # --- moving -----------------------------------------------------------------------------
 
