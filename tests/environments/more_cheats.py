@@ -348,25 +348,16 @@ def draw_one_end(hand: Hand, observation: Array) -> Iterator[Array]:
 
 def keep_both_ends(hand: Hand, observation: Array) -> Iterator[Array]:
     """make the knot, draw both ends, and let go of neither"""
-    yield from up_to_its_end(Knotter(hand))
+    yield from Knotter(hand).knot()
     yield from hand.stay(60, SHUT)
 
 
 def keep_one_end(hand: Hand, observation: Array) -> Iterator[Array]:
     """make the knot, draw both ends, and let go of one alone"""
     knotter = Knotter(hand)
-    yield from up_to_its_end(knotter)
+    yield from knotter.knot()
     yield from knotter.leave(LEFT)
     yield from knotter.hands[LEFT].stay(60, AJAR)
-
-
-def up_to_its_end(knotter: Knotter) -> Iterator[Array]:
-    """All that the expert does but for letting go."""
-    yield from knotter.first()
-    yield from knotter.second()
-    yield from knotter.draw_second()
-    yield from knotter.take_short_end()
-    yield from knotter.draw_apart()
 
 
 HAND_OVER = (swing_away, take_the_thread, drop, both_keep_it, stay_there, take_air)

@@ -1,4 +1,4 @@
-"""Eight hundred files of strangers that are no scenes, and the hostile ones that were thought of; `make fuzz` runs more."""
+"""Files of strangers that are no scenes, and the hostile ones that were thought of; `make fuzz` runs more."""
 
 from __future__ import annotations
 

@@ -75,22 +75,20 @@ APART, LOCK, SLOWEST = (np.array([0.075, -0.008, 0.005]), np.array([-0.060, 0.01
 def knot_tie(hand: Hand, observation: Array) -> Iterator[Array]:
     """Make a throw, a second one that mirrors it, draw both ends apart, and let go."""
     knotter = Knotter(hand)
-    yield from knotter.first()
-    yield from knotter.second()
-    yield from knotter.draw_second()
-    yield from knotter.take_short_end()
-    yield from knotter.draw_apart()
+    yield from knotter.knot()
     yield from knotter.let_go()
 
 
 class Knotter(Tier):
     """Both hands, and the thread."""
 
-    def first(self) -> Iterator[Array]:
-        """The first throw, drawn by the left hand."""
-        yield from self.bring()
-        yield from self.through()
-        yield from self.draw()
+    def knot(self) -> Iterator[Array]:
+        """All of the knot, both of its ends drawn, each in a hand."""
+        yield from self.first()
+        yield from self.second()
+        yield from self.draw_second()
+        yield from self.take_short_end()
+        yield from self.draw_apart()
 
     def second(self) -> Iterator[Array]:
         """The second throw, up to where the right hand has drawn the end through it."""
@@ -126,8 +124,7 @@ class Knotter(Tier):
         way = self.goal.points()[element] - (self.goal.vessel + GAP)
         yield from self.go(RIGHT, drawn_back(self.grasp(RIGHT, way, element), 0.010), SHUT, SLOW)
         yield from self.take(RIGHT, way, element)
-        found = Diagram.of(self.drawn(RIGHT))
-        if (found.determinant, found.signature, found.colourings) != SQUARE_KNOT:
+        if Diagram.of(self.drawn(RIGHT)).kind != SQUARE_KNOT:
             raise Missed("the loop of the second throw is not around the right tool")
         yield from self.leave(LEFT)
         yield from self.together(

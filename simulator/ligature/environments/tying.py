@@ -57,7 +57,6 @@ WRONG = 4
 SLOW = 0.6
 """Share of an action beside the thread."""
 
-
 SIDES = ("right", "left")
 """Names of the hands."""
 
@@ -69,9 +68,7 @@ class Missed(ValueError):
 def first_throw(hand: Hand, observation: Array) -> Iterator[Array]:
     """Bring the long end around the short one, draw it up through the loop with the other hand, and pull it close."""
     tier = Tier(hand)
-    yield from tier.bring()
-    yield from tier.through()
-    yield from tier.draw()
+    yield from tier.first()
     yield from tier.hands[LEFT].stay(60, SHUT)
 
 
@@ -89,6 +86,12 @@ class Tier:
         goal = hand.env.goal
         assert isinstance(goal, Ligating)
         self.goal, self.hands = goal, (hand, hand.other(LEFT))
+
+    def first(self) -> Iterator[Array]:
+        """The first throw, drawn by the left hand."""
+        yield from self.bring()
+        yield from self.through()
+        yield from self.draw()
 
     def bring(self) -> Iterator[Array]:
         """The right hand lays the long end over the short one, and brings it below that."""

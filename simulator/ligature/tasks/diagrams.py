@@ -86,6 +86,11 @@ class Diagram:
         """Three-colourings of the knot: 3 without a knot, 9 for a trefoil, 27 for the sum of two."""
         return int(3 ** (1 + len(self._goeritz[0]) - _rank(np.rint(self._goeritz[0]).astype(np.int64), 3)))
 
+    @property
+    def kind(self) -> tuple[int, int, int]:
+        """Determinant, signature and three-colourings of the knot: together they tell many knots apart."""
+        return self.determinant, self.signature, self.colourings
+
     @cached_property
     def _goeritz(self) -> tuple[Array, int]:
         """Goeritz matrix of the white regions but one, and the correction of its signature."""

@@ -165,8 +165,7 @@ class SquareKnotScore:
         diagram = Diagram.of(extended(points, centre))
         below = (np.linalg.norm((points - centre)[:, 1:], axis=1) < 1.5 * radius) & (points[:, 2] < centre[2])
         loop = float(np.median(tension[below])) if below.any() else 0.0
-        kind = diagram.determinant, diagram.signature, diagram.colourings
-        return cls(*kind, knotted_around(points, centre, radius), loop, hands_empty, time)
+        return cls(*diagram.kind, knotted_around(points, centre, radius), loop, hands_empty, time)
 
     @property
     def success(self) -> bool:

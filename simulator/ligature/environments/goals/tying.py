@@ -105,7 +105,7 @@ class KnotTie(Ligating):
         if not knotted_around(lying, np.zeros(3), self.radius):
             return 0
         found = Diagram.of(extended(lying, np.zeros(3)))
-        if found.colourings == SQUARE_KNOT[2] and (found.determinant, found.signature) == SQUARE_KNOT[:2]:
+        if found.kind == SQUARE_KNOT:
             return 2
         return int(found.determinant % HALF_KNOT == 0)
 
