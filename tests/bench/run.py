@@ -7,7 +7,8 @@ import sys
 
 BENCHMARKS = (
     "scenes", "resets", "start", "growth", "environments", "datasets", "on_ros", "latency", "arm_latency", "teleop_latency",
-    "teleop_suture", "kinematics", "cameras", "render", "suturing_on_ros", "ledger",
+    "teleop_suture", "kinematics", "cameras", "render", "suturing_on_ros", "flame",
+    "ledger",
 )  # fmt: skip
 
 
