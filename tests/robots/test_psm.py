@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from ligature.model.frames import pose_matrix
 from ligature.robots.instruments import INSTRUMENTS
+from ligature.robots.inverse import Reason
 from ligature.robots.psm import MODELS, SRC_LENGTHS, Psm
 
 from tests.robots import examples
@@ -43,6 +44,19 @@ def test_the_inverse_undoes_the_forward_for_100000_poses(number, model):
     assert near.ok.all()
     assert_same_pose(psm.forward(freely.q), T)
     np.testing.assert_allclose(near.q, q, rtol=0, atol=1e-9)
+
+
+def test_one_pose_has_the_same_joint_values_alone(psm):
+    rng, codes, q = np.random.default_rng(1), set(), np.empty(6)
+    joints = random_joints(psm, 500, -0.05) + rng.normal(0.0, 0.3, (500, 6)) * (rng.random((500, 1)) < 0.5)
+    for T, seed in zip(psm.forward(joints), rng.uniform(-7.0, 7.0, (500, 6)), strict=True):
+        T[:3, :3] *= 1.0 if rng.random() < 0.9 else 1.1
+        seed[3] = np.nan if rng.random() < 0.1 else seed[3]
+        code, wanted = psm.solve(T, seed, q), psm.inverse(T, seed)
+        assert code == wanted.code
+        assert q.tobytes() == wanted.q.tobytes()
+        codes.add(code)
+    assert {Reason.REACHED, Reason.OUTSIDE_LIMITS, Reason.NOT_A_POSE} <= codes
 
 
 def test_close_to_the_remote_centre_the_pose_is_still_met(psm):

@@ -73,7 +73,8 @@ class JawPlant:
 
     def servo(self, position: Array, velocity: Array) -> None:
         """Open to ``position`` (1,); below zero the fingers press."""
-        self._drive.servo(np.repeat(position / 2.0, 2), np.repeat(velocity / 2.0, 2))
+        half, speed = float(position[0]) / 2.0, float(velocity[0]) / 2.0
+        self._drive.servo(np.array([half, half]), np.array([speed, speed]))
 
     def push(self, effort: Array) -> None:
         """Turn each finger with ``effort`` (1,)."""

@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.environments.reading import ArmReading
+from ligature.kernels import compiled
 from ligature.model.frames import axis_rotation
+from ligature.robots.chain import forward_row
 from ligature.robots.operating_state import Rejected
 from ligature.robots.poses import rotation_vector
 from ligature.robots.psm_arm import PsmArm
+from ligature.unrolled import Matrix, unrolled
 
 Array = NDArray[np.float64]
 
@@ -34,6 +37,7 @@ class ArmActions:
 
     def __init__(self, arm: PsmArm, reading: ArmReading, kind: str) -> None:
         self._arm, self._reading, self._kind = arm, reading, kind
+        self._before, self._T_measured, self._T = np.zeros(arm.joints.n), np.zeros((4, 4)), np.zeros((4, 4))
 
     def act(self, action: Array) -> tuple[str, bool]:
         """Command the arm by an action (7,) of -1 to 1; what it rejects is returned, and it stays.
@@ -54,14 +58,14 @@ class ArmActions:
 
     def _act_on_tip(self, action: Array) -> bool:
         """Move the set-point by an action, near the tip; whether it was held back for that."""
-        forward, reading = self._arm.kinematics.forward, self._reading
-        before = reading.joint_setpoints.copy()
-        T, bounded = _bounded(forward(reading.joints), _stepped(forward(before), action))
-        self._arm.servo_cp(T)
-        if np.abs(self._arm.setpoint_js().position - before).max() <= LEAP:
+        arm, reading, before, T = self._arm, self._reading, self._before, self._T
+        before[:] = reading.joint_setpoints
+        bounded = not _step_setpoint(*arm.kinematics.tables(), reading.joints, before, action, self._T_measured, T)
+        arm.servo_cp(_bounded(self._T_measured, T) if bounded else T)
+        if np.abs(arm.joints.setpoint[0] - before).max() <= LEAP:
             return bounded
         # beyond the limits of the wrist the same pose has other joints, and on the way there the tip is elsewhere
-        self._arm.servo_jp(before)
+        arm.servo_jp(before)
         return True
 
     def _act_on_joints(self, step: Array) -> bool:
@@ -71,26 +75,58 @@ class ArmActions:
         return bool((near != wanted).any())
 
 
-def _stepped(T: Array, action: Array) -> Array:
-    """The set-point ``T`` (4, 4) moved by an action, in place."""
-    T[:3, 3] += STEP_LENGTH * action[:3]
-    turn = STEP_ANGLE * action[3:6]
-    angle = _length(turn)
+@unrolled(A=(3, 3), B=(3, 3), C=(3, 3))
+def _multiply(k: int, A: Matrix, B: Matrix, C: Matrix) -> None:
+    """Row ``k`` of ``C`` is the product of those of ``A`` and ``B``, with the bits of OpenBLAS for `blas.CORE`."""
+    C[k] = A[k] @ B[k]
+
+
+@compiled
+def _step_setpoint(
+    table: Array, modified: bool, tip: Array, measured: Array, before: Array, action: Array, T_measured: Array, T: Array
+) -> bool:
+    """Poses (4, 4) of the tip: ``T_measured`` at the joints ``measured``, ``T`` where an ``action`` moves it to.
+
+    It moves from the joints ``before``; the first three arguments are those of the kinematics. Returns whether ``T`` is
+    within `AHEAD_LENGTH` and `AHEAD_ANGLE` of what is measured.
+    """
+    forward_row(table, modified, tip, measured, T_measured)
+    forward_row(table, modified, tip, before, T)
+    for a in range(3):
+        T[a, 3] += STEP_LENGTH * action[a]
+    x, y, z = STEP_ANGLE * action[3], STEP_ANGLE * action[4], STEP_ANGLE * action[5]
+    angle = math.sqrt(x * x + y * y + z * z)
     if angle > 0.0:
-        T[:3, :3] = T[:3, :3] @ axis_rotation(turn / angle, angle)
-    return T
+        _turn(T, x / angle, y / angle, z / angle, angle)
+    overlap = np.empty((3, 3))
+    way = 0.0
+    for i in range(3):
+        for j in range(3):
+            overlap[i, j] = T_measured[i, j] * T[i, j]
+        ahead = T[i, 3] - T_measured[i, 3]
+        way += ahead * ahead
+    (a, b, c), (d, e, f), (g, h, i) = overlap
+    cosine = 0.5 * ((((a + b) + (c + d)) + ((e + f) + (g + h)) + i) - 1.0)  # in this order NumPy adds nine numbers
+    return math.sqrt(way) <= AHEAD_LENGTH and cosine >= NEAR_COSINE
 
 
-def _is_near(T_measured: Array, T: Array) -> bool:
-    """Whether a set-point (4, 4) is within `AHEAD_LENGTH` and `AHEAD_ANGLE` of what is measured."""
-    cosine = 0.5 * (float((T_measured[:3, :3] * T[:3, :3]).sum()) - 1.0)
-    return _length(T[:3, 3] - T_measured[:3, 3]) <= AHEAD_LENGTH and cosine >= NEAR_COSINE
+@compiled
+def _turn(T: Array, x: float, y: float, z: float, angle: float) -> None:
+    """Turn the pose ``T`` (4, 4) about the unit vector x y z of its own axes, as `axis_rotation` does."""
+    K, square, turn, turned = np.zeros((1, 3, 3)), np.empty((1, 3, 3)), np.empty((1, 3, 3)), np.empty((1, 3, 3))
+    K[0, 0, 1], K[0, 0, 2], K[0, 1, 0], K[0, 1, 2], K[0, 2, 0], K[0, 2, 1] = -z, y, z, -x, -y, x
+    _multiply(0, K, K, square)
+    sine, rest = math.sin(angle), 1.0 - math.cos(angle)
+    for i in range(3):
+        for j in range(3):
+            turn[0, i, j] = (1.0 if i == j else 0.0) + sine * K[0, i, j] + rest * square[0, i, j]
+            K[0, i, j] = T[i, j]
+    _multiply(0, K, turn, turned)
+    T[:3, :3] = turned[0]
 
 
-def _bounded(T_measured: Array, T: Array) -> tuple[Array, bool]:
-    """A set-point (4, 4) no farther from what is measured than `AHEAD_LENGTH` and `AHEAD_ANGLE`, and whether it was."""
-    if _is_near(T_measured, T):
-        return T, False
+def _bounded(T_measured: Array, T: Array) -> Array:
+    """A set-point (4, 4) no farther from what is measured than `AHEAD_LENGTH` and `AHEAD_ANGLE`."""
     ahead, found = T[:3, 3] - T_measured[:3, 3], T.copy()
     length, turn = _length(ahead), rotation_vector(T_measured[:3, :3].T @ T[:3, :3])
     angle = _length(turn)
@@ -98,7 +134,7 @@ def _bounded(T_measured: Array, T: Array) -> tuple[Array, bool]:
         found[:3, 3] = T_measured[:3, 3] + ahead * (AHEAD_LENGTH / length)
     if angle > AHEAD_ANGLE:
         found[:3, :3] = T_measured[:3, :3] @ axis_rotation(turn / angle, AHEAD_ANGLE)
-    return found, True
+    return found
 
 
 def _length(vector: Array) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,37 @@ ACTION = 7
 STATE, FURTHER = 52, 33
 """Numbers of a state observation of one arm, and of each further one."""
 
-PLACE, TURN, TARGET = slice(14, 17), slice(17, 21), slice(30, 33)
-"""Place and quaternion of what is handled, and the target."""
+PLACE, TURN, TWIST, TARGET = slice(14, 17), slice(17, 21), slice(21, 27), slice(30, 33)
+"""Place, quaternion and twist of what is handled, and the target."""
 
-HELD = 49
-"""Whether the first arm's jaws hold what is handled."""
+POSE = slice(PLACE.start, TURN.stop)
+"""Place and quaternion together."""
+
+LEFT = 33
+"""How far there is to go."""
+
+HELD, MARKS = 49, slice(49, 52)
+"""Whether the first arm's jaws hold what is handled; that, the share of the time and the stage."""
+
+
+class Places(NamedTuple):
+    """Where the numbers of an arm begin: joints, jaw and tip; control point; velocities and set-points."""
+
+    joints: int
+    control_point: int
+    velocities: int
+
+
+def places(arm: int) -> Places:
+    """Where a state observation has the numbers of an arm, by its number."""
+    begin = STATE + FURTHER * (arm - 1)
+    return Places(begin, begin + 14, begin + 17) if arm else Places(0, 27, 34)
+
+
+def held_at(arm: int) -> int:
+    """Where it has whether the jaws of an arm hold what is handled."""
+    return STATE + FURTHER * arm - 1 if arm else HELD
+
 
 _ANGLES = (0, 1, 3, 4, 5, 6)
 """Joints that turn, and the jaw, among the numbers of an arm."""

@@ -24,8 +24,9 @@ from ligature.environments import layout
 from ligature.environments.actions import ArmActions
 from ligature.environments.goals import GOALS, Goal, Progress
 from ligature.environments.randomisation import Drawn, Randomisation
-from ligature.environments.reading import ArmReading
+from ligature.environments.reading import ArmReading, write_on_side
 from ligature.environments.variation import Channel, dress, place, varied
+from ligature.kernels import compiled
 from ligature.model.frames import pose7_matrix
 from ligature.model.load import load
 from ligature.model.scene import Scene
@@ -379,8 +380,8 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         """An action as numbers from -1 to 1."""
         width = layout.action_width(len(self._arms))
         found = layout.numbers_of(action, (width,), f"an action is {width} numbers")
-        found[np.isnan(found)] = 0.0
-        return np.minimum(np.maximum(found, -1.0), 1.0)
+        _bound(found)
+        return found
 
     def _check_open(self) -> None:
         if self._closed:
@@ -447,19 +448,15 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
     def _numbers(self) -> Array:
         """The state, as the table of the class has it."""
         assert self._progress is not None
-        arm, state = self._readings[0], self._simulation.state
-        pose, twist = state["body_pose"][0, self.needle], state["body_twist"][0, self.needle]
-        numbers = [
-            arm.joints, arm.jaw[:1], _on_side(arm.tip, self._tip_sides[0]), _on_side(pose, self._side), twist,
-            arm.tip_position(), self._goal.target(), (self._progress.left,), arm.joint_velocities,
-            arm.jaw[1:2], _on_side(arm.setpoint, self._tip_sides[0]), arm.jaw_setpoint[:1], self._goal.marks(),
-        ]  # fmt: skip
-        for k, (arm, side) in enumerate(zip(self._readings[1:], self._tip_sides[1:], strict=True), 1):
-            numbers += [
-                arm.joints, arm.jaw[:1], _on_side(arm.tip, side), arm.tip_position(), arm.joint_velocities,
-                arm.jaw[1:2], _on_side(arm.setpoint, side), arm.jaw_setpoint[:1], (self._goal.holds(k),),
-            ]  # fmt: skip
-        found = np.concatenate(numbers)
+        state, goal = self._simulation.state, self._goal
+        found = np.empty(layout.state_width(len(self._arms)))
+        for k, (arm, side) in enumerate(zip(self._readings, self._tip_sides, strict=True)):
+            arm.write(layout.places(k), side, found)
+            if k:
+                found[layout.held_at(k)] = goal.holds(k)
+        write_on_side(state["body_pose"][0, self.needle], self._side, found[layout.POSE])
+        found[layout.TWIST] = state["body_twist"][0, self.needle]
+        found[layout.TARGET], found[layout.LEFT], found[layout.MARKS] = goal.target(), self._progress.left, goal.marks()
         return found if self._channel is None else self._channel.sense(found)
 
     def _info(self) -> dict[str, Any]:
@@ -507,6 +504,14 @@ _STARTS: WeakKeyDictionary[Scene, dict[tuple[type[Goal], tuple[str, ...], int], 
 """Settled starts by scene, task, arms and number; the processes of a vector have them from the one that forks."""
 
 
+@compiled
+def _bound(action: Array) -> None:
+    """Make an ``action`` numbers from -1 to 1: 0 of NaN, the nearer end of what is beyond."""
+    for k in range(action.shape[0]):
+        value = action[k]
+        action[k] = 0.0 if value != value else min(max(value, -1.0), 1.0)
+
+
 def _arms(task: str, given: str | Sequence[str] | None) -> tuple[str, ...]:
     """Names of the arms that act; ValueError where the task needs more or fewer."""
     own = GOALS[task].arms
@@ -541,11 +546,6 @@ def _scene(task: str, arms: tuple[str, ...]) -> Scene:
     fixed = {needle.body for needle in scene.needles}
     bodies = tuple(replace(body, mass=0.0) if body.index in fixed else body for body in scene.bodies)
     return replace(scene, bodies=bodies, rods=())
-
-
-def _on_side(pose: Array, side: Array) -> Array:
-    """A pose (7,) whose quaternion has the sign that is nearer to ``side`` (4,): it has no leaps near there."""
-    return pose if pose[3:] @ side >= 0.0 else np.concatenate([pose[:3], -pose[3:]])
 
 
 def _made(options: Mapping[str, Any], state: EnvState | None) -> SuturingEnv:

@@ -13,6 +13,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from ligature.kernels import compiled
 from ligature.model.commands import CommandType
 from ligature.model.scene import Joint, JointType, OutputType
 from ligature.physics.articulation import MOST_DAMPED, STIFFEST, Tree
@@ -25,6 +26,20 @@ Flags = NDArray[np.bool_]
 
 KICK_SECONDS = 0.01
 """Time over which the derivative answers a jump of the target: two updates of a usual AMBF session."""
+
+
+@compiled
+def _follow(
+    owned: Flags, target: Array, pace: Array, mode: Integers, rows: Integers, position: Array, velocity: Array
+) -> bool:
+    """Give the axes ``rows`` (k,) to an arm with set-points that move; whether all follow such in their ``mode``."""
+    follow = True
+    for k in range(rows.shape[0]):
+        row = rows[k]
+        owned[row], target[row], pace[row] = True, position[k], velocity[k]
+        follow = follow and mode[row] == SERVO
+    return follow
+
 
 MOTORISED = (JointType.REVOLUTE, JointType.PRISMATIC)
 PUSHED = (*MOTORISED, JointType.LINEAR_SPRING, JointType.TORSION_SPRING)
@@ -151,10 +166,7 @@ class TreeControl:
         overshoot. ``yield_stiffness`` (k,) is the stiffness (N·m/rad, N/m) with which a motor yields to a load; 0 is
         as strong as the motor.
         """
-        self.owned[rows] = True
-        self.target[rows] = position
-        self.axes.pace[rows] = velocity
-        if (self.mode[rows] != SERVO).any():
+        if not _follow(self.owned, self.target, self.axes.pace, self.mode, rows, position, velocity):
             self.axes.max_velocity[rows], self.axes.max_deceleration[rows] = max_velocity, max_deceleration
             self.axes.yield_stiffness[rows] = yield_stiffness
             self._enter(rows, SERVO)

@@ -62,14 +62,14 @@ class BulletQueries:
         ``within`` stands for all that is farther.
         """
         uid, client = self._probes[probe], self._engine.client
-        pybullet.resetBasePositionAndOrientation(uid, pose[:3].tolist(), pose[3:].tolist(), physicsClientId=client)
-        gaps = []
+        numbers, gaps = pose.tolist(), []
+        pybullet.resetBasePositionAndOrientation(uid, numbers[:3], numbers[3:], physicsClientId=client)
         for body in bodies:
             gap = within
             for other, link in self._engine.shapes_of(body):
                 at = (uid, other, within, -1, link)
                 for point in pybullet.getClosestPoints(*at, physicsClientId=client) or ():
-                    gap = min(gap, float(point[8]))
+                    gap = min(gap, point[8])
             gaps.append(gap)
         return gaps
 

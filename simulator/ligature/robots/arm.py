@@ -18,7 +18,7 @@ from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.robots.axes import Axes, Mode
 from ligature.robots.device import Device
 from ligature.robots.impedance import CartesianImpedance
-from ligature.robots.inverse import InverseResult, Reason
+from ligature.robots.inverse import REASONS, InverseResult, Reason
 from ligature.robots.operating_state import Rejected, State, towards_enabled
 from ligature.robots.poses import pose_matrix_of, turned
 
@@ -58,6 +58,9 @@ class NoWrench:
 
 
 NO_WRENCH = NoWrench()
+
+WITH_JOINTS = (Reason.REACHED, Reason.OUTSIDE_LIMITS)
+"""Codes of poses for which there are joint values; beyond limits these are clipped."""
 
 
 class JointState(NamedTuple):
@@ -116,6 +119,7 @@ class Arm(Device):
         self.gravity_compensation = False
         self.cf_orientation_absolute = False
         self._T_reference_base = np.eye(4)
+        self._inverted = self._T_reference_base, np.eye(4)
         self._pushing: tuple[str, Any] | None = None
         self._direct = False
         self._tip_wrench: Callable[[], Array] | None = None
@@ -362,13 +366,18 @@ class Arm(Device):
         """Joint values of a pose in the reference frame; beyond joint limits they are clipped, as the drives do."""
         T = pose_matrix_of(pose, what)
         if not self._direct:
-            T = inverse(self._T_reference_base) @ T
-        result = self.kinematics.inverse(T, self.joints.setpoint[0])
-        if int(result.code) not in (Reason.REACHED, Reason.OUTSIDE_LIMITS):
+            T = self._base_from_reference @ T
+        q, code = self._joints_at(T)
+        if code not in WITH_JOINTS:
             raise Rejected(
-                f"{what}: no inverse kinematics of {self.name} at {T[:3, 3].round(4).tolist()}: {result.reason}"
+                f"{what}: no inverse kinematics of {self.name} at {T[:3, 3].round(4).tolist()}: {REASONS[code]}"
             )
-        return self.joints.clipped(result.q)
+        return self.joints.clipped(q)
+
+    def _joints_at(self, T: Array) -> tuple[Array, Reason]:
+        """Joint values (n,) of a pose (4, 4) in the base, and the code of `InverseResult`."""
+        result = self.kinematics.inverse(T, self.joints.setpoint[0])
+        return result.q, Reason(int(result.code))
 
     def servo_cv(self, twist: ArrayLike) -> None:
         """Follow a stream of tip twists (6,) in axes of the reference frame; the arm stops when the stream does."""
@@ -442,6 +451,15 @@ class Arm(Device):
         self._T_reference_base = pose_matrix_of(pose, "set_base_frame")
         self.reference = reference
         self.emit("base_frame", reference)
+
+    @property
+    def _base_from_reference(self) -> Array:
+        """Pose (4, 4) of the reference frame in the base; kept, for it is asked for with every pose."""
+        of, found = self._inverted
+        if of is not self._T_reference_base:
+            found = inverse(self._T_reference_base)
+            self._inverted = self._T_reference_base, found
+        return found
 
     @property
     def base_frame(self) -> Array:

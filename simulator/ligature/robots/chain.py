@@ -194,10 +194,16 @@ def append(T: Array, tip: Array) -> None:
 @compiled
 def _forward_rows(table: Array, modified: bool, tip: Array, q: Array, out: Array) -> None:
     for k in range(q.shape[0]):
-        identity(out[k])
-        for j in range(table.shape[0]):
-            advance(table[j], modified, q[k, j], out[k])
-        append(out[k], tip)
+        forward_row(table, modified, tip, q[k], out[k])
+
+
+@compiled
+def forward_row(table: Array, modified: bool, tip: Array, q: Array, T: Array) -> None:
+    """Pose ``T`` (4, 4) of the tip in the base at the joint values ``q`` (n,); see `Chain.tables`."""
+    identity(T)
+    for j in range(table.shape[0]):
+        advance(table[j], modified, q[j], T)
+    append(T, tip)
 
 
 @compiled

@@ -148,6 +148,11 @@ class Psm(Chain):
         )  # fmt: skip
         return out.result()
 
+    def solve(self, T_base_tip: Array, seed: Array, q: Array) -> Reason:
+        """`inverse` of one pose (4, 4) in a third of the time: it writes ``q`` (6,), and returns its code."""
+        code = _inverse_pose(self._table, self.lengths.tool_to_rcm, self._tip, self._limits, T_base_tip, seed, q)
+        return Reason(code)
+
 
 def _lengths(tool: Instrument, model: str) -> PsmLengths:
     if model in MANIPULATORS:
@@ -188,6 +193,21 @@ def _inverse_rows(
                 code[k] = Reason.OUTSIDE_LIMITS
         if code[k] != Reason.REACHED and code[k] != Reason.OUTSIDE_LIMITS:
             q[k] = np.nan
+
+
+@compiled
+def _inverse_pose(
+    table: Array, tool_to_rcm: float, tip: Array, limits: Array, pose: Array, seed: Array, q: Array
+) -> int:
+    """Solve one ``pose`` (4, 4) near ``seed`` (6,); ``q`` (6,) is written, and its code returned."""
+    poses, seeds, rows = np.empty((1, 4, 4)), np.zeros((1, 6)), np.empty((1, 6))
+    code, joint = np.empty(1, np.int64), np.empty(1, np.int64)
+    poses[0] = pose
+    if np.isfinite(seed[ROLL]):
+        seeds[0, ROLL] = seed[ROLL]
+    _inverse_rows(table, tool_to_rcm, tip, limits, poses, seeds, rows, code, joint)
+    q[:] = rows[0]
+    return code[0]  # type: ignore[no-any-return]
 
 
 @compiled

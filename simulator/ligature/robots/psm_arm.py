@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ligature.robots.arm import Arm, JointState
 from ligature.robots.axes import Axes
 from ligature.robots.instruments import instrument
+from ligature.robots.inverse import Reason
 from ligature.robots.operating_state import Rejected
 from ligature.robots.psm import INSERTION, Psm
 
@@ -154,6 +155,10 @@ class PsmArm(Arm):
             return q
         q[INSERTION] = max(q[INSERTION], self.kinematics.insertion_at(LEAST_DEPTH))
         return q
+
+    def _joints_at(self, T: Array) -> tuple[Array, Reason]:
+        q = np.empty(self.joints.n)
+        return q, self.kinematics.solve(T, self.joints.setpoint[0], q)
 
     # --- jaw --------------------------------------------------------------------------------
 

@@ -314,7 +314,8 @@ class Ghosts(Subsystem):
 
     def _measure_pairs(self, ghost_world: Array) -> None:
         due: dict[int, list[int]] = {}
-        for ghost, row in np.argwhere(self._due).tolist():
+        for pair in self._due.ravel().nonzero()[0].tolist():
+            ghost, row = divmod(pair, len(self._solid))
             due.setdefault(ghost, []).append(row)
         for ghost, rows in due.items():
             candidates = self._solid[rows].tolist()

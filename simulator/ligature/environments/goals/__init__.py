@@ -1,6 +1,6 @@
 """The tasks of the environments, by name: `base` has what they share."""
 
-from ligature.environments.goals.base import Goal, Progress, holds, tip_position
+from ligature.environments.goals.base import Goal, Progress, holds
 from ligature.environments.goals.driving import Insert, Puncture
 from ligature.environments.goals.handing import HandOver
 from ligature.environments.goals.pegs import PegTransfer
@@ -24,7 +24,6 @@ __all__ = [
     "Reach",
     "Suture",
     "holds",
-    "tip_position",
 ]
 
 GOALS: dict[str, type[Goal]] = {

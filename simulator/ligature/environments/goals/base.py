@@ -126,6 +126,8 @@ class Goal:
 
     def __init__(self, simulation: Simulation, arms: Sequence[PsmArm]) -> None:
         self._simulation, self._arms = simulation, tuple(arms)
+        self._readings = tuple(ArmReading(simulation, arm) for arm in arms)
+        self._body_pose: Array = simulation.state["body_pose"][0]
         self._prepare()
 
     def _prepare(self) -> None:
@@ -172,7 +174,7 @@ class Goal:
 
     def _poses(self) -> Array:
         """Poses (bodies, 7) of all bodies now."""
-        return np.asarray(self._simulation.state["body_pose"][0])
+        return self._body_pose
 
     def _pose(self, body: int) -> Array:
         """Pose (4, 4) of a body now."""
@@ -184,7 +186,7 @@ class Goal:
 
     def _tip(self, arm: int = 0) -> Array:
         """The control point (3,) of an arm of the task, world axes."""
-        return tip_position(self._simulation, self._arms[arm])
+        return self._readings[arm].tip_position()
 
     def holds(self, arm: int = 0) -> bool:
         """Whether the jaws of an arm of the task hold its body."""
@@ -194,11 +196,6 @@ class Goal:
 def holds(simulation: Simulation, arm: PsmArm, body: int) -> bool:
     """Whether the jaws of ``arm`` hold ``body`` between their pads."""
     return simulation.grasps.body_in(arm.name) == body
-
-
-def tip_position(simulation: Simulation, arm: PsmArm) -> Array:
-    """The control point of an arm's tool (3,), world axes."""
-    return ArmReading(simulation, arm).tip_position()
 
 
 def base_of(simulation: Simulation, arm: PsmArm) -> Array:
