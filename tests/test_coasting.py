@@ -158,15 +158,17 @@ def test_a_thread_that_coasts_has_the_bits_of_one_that_does_not(
     assert passed[0] > 60
 
 
-def _demonstrated(task: str, seed: int, noise: float, coasts: bool) -> tuple[list[str], int]:
-    """State hashes of an episode, and ticks that coasted while a jaw held something."""
+def _demonstrated(task: str, seed: int, noise: float, coasts: bool) -> tuple[list[str], int, int]:
+    """State hashes of an episode, and ticks that coasted while a jaw held something, and something was in a hole."""
     env = SuturingEnv(task, max_steps=180)
-    simulation, hashes, carried = env.simulation, list[str](), 0
+    simulation, hashes, carried, inserted = env.simulation, list[str](), 0, 0
     coast = simulation._ticking.coasting.pass_ticks
 
     def counted(ticks: int, begins: bool = False) -> tuple[int, int]:
-        nonlocal carried
+        nonlocal carried, inserted
+        within = bool(simulation.insertions)
         passed, begun = coast(ticks, begins) if coasts else (0, 0)
+        inserted += passed if within else 0
         carried += passed if any(held is not None for held in simulation.grasps.values()) else 0
         return passed, begun
 
@@ -177,10 +179,10 @@ def _demonstrated(task: str, seed: int, noise: float, coasts: bool) -> tuple[lis
         patch.setattr(simulation._ticking.coasting, "pass_ticks", counted)
         demonstrate(env, seed, noise, look, slips=True)
         for _ in range(8):  # the jaws open
-            env.step(np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0], dtype=np.float32))
+            env.step(np.tile(np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0], dtype=np.float32), len(env.arms)))
             look()
     env.close()
-    return hashes, carried
+    return hashes, carried, inserted
 
 
 @pytest.mark.parametrize(
@@ -189,9 +191,18 @@ def _demonstrated(task: str, seed: int, noise: float, coasts: bool) -> tuple[lis
 def test_jaws_that_search_hold_and_let_go_while_coasting_have_the_bits_of_those_that_do_not(
     task: str, seed: int, noise: float
 ) -> None:
-    hashes, carried = _demonstrated(task, seed, noise, True)
+    hashes, carried, _ = _demonstrated(task, seed, noise, True)
     assert hashes == _demonstrated(task, seed, noise, False)[0]
     assert carried > 100
+
+
+@pytest.mark.parametrize(("task", "seed", "noise"), [("insert", 2, 0.3), ("pull_through", 0, 0.3), ("suture", 0, 0.3)])
+def test_needles_and_threads_that_enter_and_leave_holes_while_coasting_have_the_bits_of_those_that_do_not(
+    task: str, seed: int, noise: float
+) -> None:
+    hashes, _, inserted = _demonstrated(task, seed, noise, True)
+    assert hashes == _demonstrated(task, seed, noise, False)[0]
+    assert inserted > 500
 
 
 def test_a_coast_ends_in_the_tick_in_which_other_bodies_come_near_a_thread(

@@ -57,6 +57,7 @@ class Coasting:
         self.spent[:] = 0.0
         if not self.begins:
             return 0, 0
+        self._suture.load_ahead()
         passed, begun, sound = self._coast(ticks if self.coasts else 0, begins)
         self._suture.conclude(passed, begun)
         self._world.conclude(sound)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ligature.arms.courses import strays
 from ligature.coasting.clock import now
-from ligature.coasting.passages import find_passages
+from ligature.coasting.passages import find_passages, react_all
 from ligature.grasping.exchange import carry
 from ligature.grasping.looking import may_grasp
 from ligature.kernels import inlined, kernel
@@ -15,7 +15,7 @@ from ligature.physics.preparing import prepare
 from ligature.physics.trees import load_body, push_bodies, read_bodies, step_world
 from ligature.suture.colliders import LOOKS, NEAR
 from ligature.suture.placing import look, open_watch
-from ligature.suture.searching import LOOKED, SEARCHED, SOLVED
+from ligature.suture.searching import LOOKED, SOLVED
 from ligature.suture.substeps import open_rod
 from ligature.suture.ticking import RodTick, call_tick_rod, open_rod_tick, surround
 
@@ -38,7 +38,7 @@ def coast(
     """Advance by up to ``ticks``, and where ``begins`` is 1 begin another one, up to the step of the bodies.
 
     It ends after one in which anything is not finite or has a speed not below ``limit``, and within one in which
-    something has entered a hole, other bodies are near the threads than before, or a jaw may grasp or let go.
+    something has entered or left a hole, other bodies are near the threads than before, or a jaw may grasp or let go.
     It ends before one in which an arm is found away from its set-point.
 
     The first arguments are those of `prepare`; ``total`` and ``acted`` are those of `Impulses`, ``search`` the table of
@@ -56,13 +56,15 @@ def coast(
         prepare(handle, tree_table, axis_table, place_table, slowed, factors, lifted, forces, dt)
         prepared = now(clock)
         spent[0] += prepared - begin
-        if find_passages(handle, tree_table, place_table, search):
-            return passed, SEARCHED, True
+        found = find_passages(handle, tree_table, place_table, search)
+        if found != 0:
+            return passed, found, True
         whole = True
         if threads is not None:
             if _look_around(handle, tree_table, place_table, threads, dt):
                 return passed, LOOKED, True
             whole = _pass_rods(handle, tree_table, place_table, threads, total, acted, dt)
+            react_all(handle, tree_table, place_table, search, total, acted, dt)
         held = passed < ticks
         if threads is not None:
             held = held and not may_grasp(tree_table, looks, threads[3], passed)

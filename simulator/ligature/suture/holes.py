@@ -25,8 +25,7 @@ from ligature.suture.bodies import HeldBodies
 from ligature.suture.passage_forces import react, solve_needle
 from ligature.suture.rod import Rod
 from ligature.suture.rods import Rods
-from ligature.suture.searching import Search, search
-from ligature.suture.tracking import follow_needle, follow_rod
+from ligature.suture.searching import Search, follow, search
 from ligature.tables import table_of
 
 Array = NDArray[np.float64]
@@ -107,8 +106,8 @@ class Holes:
         self.search_table = np.zeros(0, np.int64) if self.idle else table_of(self._search)
         """The table of a `Search`, empty where nothing can ever be in a hole."""
         self._fields = FieldViews("insertion_count")
-        self._looked = False
-        """Whether compiled code did in this tick what `begin` does until passages are followed."""
+        self._looked = self._followed = False
+        """Whether compiled code did in this tick what `begin` does until passages are followed; and that, too."""
 
     def _search_of(self, dt: float) -> Search:
         """What `search` takes; at first it looks at once, at all holes."""
@@ -124,7 +123,8 @@ class Holes:
             sites=self._site_table, rods=np.array(self._rod_tables or np.zeros((0, 1)), dtype=np.int64),
             first=np.array([rod.first for rod in rods], dtype=np.int64),
             elements=np.array([len(length) - 1 for length in lengths], dtype=np.int64), before=before,
-            dt=np.array([dt]),
+            dt=np.array([dt]), mobile=self._mobile, lasting=np.zeros(arrays.CAPACITY, np.bool_),
+            reaction=self._reaction,
         )  # fmt: skip
 
     # --- the tick ---------------------------------------------------------------------------
@@ -140,17 +140,24 @@ class Holes:
         else:
             self._bodies.read_motions(self._search.watched, self._search.motion)
             search(self.search_table)
+        followed, self._followed = self._followed, False
         if self._passages.filled[0]:
-            self._follow()
+            self._follow(followed)
 
     @property
-    def empty(self) -> bool:
-        """Whether `begin` only searches now, and `end` does nothing."""
-        return not self._passages.filled[0]
+    def coasts(self) -> bool:
+        """Whether rods solve whatever is in a hole now, so that `begin` and `end` are what compiled code does."""
+        n = self._passages.filled[0]
+        return not n or bool((self._passages.owner[:n] >= 0).all())
 
-    def look_ahead(self) -> None:
-        """Compiled code has searched, or counted a tick, for the coming `begin`."""
-        self._looked = True
+    def load_ahead(self) -> None:
+        """Have rods solve needles in the coming ticks of compiled code, until a command comes or a jaw grasps."""
+        for path in self._inserted() if self._passages.filled[0] else ():
+            self._load_needle(path)
+
+    def look_ahead(self, followed: bool) -> None:
+        """Compiled code has searched, or counted a tick, for the coming `begin`; and ``followed`` passages."""
+        self._looked, self._followed = True, followed
 
     def end(self) -> None:
         """Solve needles without a rod and apply the reactions to the holes, after the rods have advanced."""
@@ -174,35 +181,23 @@ class Holes:
             motion = self._search.motion[len(self._needles) + hole]
             sites.pose[hole], sites.twist[hole] = motion[:7], motion[7:]
 
-    def _follow(self) -> None:
-        """Update all passages and drop those that have ended."""
-        p, n = self._passages, int(self._passages.filled[0])
-        self._bodies.read_motions(self._search.watched, self._search.motion)
-        self._place_holes(sorted(set(p.hole[:n].tolist())))
-        self._sites.shared[:] = np.bincount(p.hole[:n], minlength=len(self._sites.shared))
-        for path in sorted(set(p.path[:n].tolist())):
-            if path < len(self._needles):
-                self._read_needle(path)
-        lasting = [c for c in range(n) if self._follows(c)]
-        if len(lasting) < n:
-            self._keep(lasting)
+    def _follow(self, followed: bool) -> None:
+        """Update all passages, unless compiled code has ``followed`` them, and drop those that have ended."""
+        n = int(self._passages.filled[0])
+        if not followed:
+            self._bodies.read_motions(self._search.watched, self._search.motion)
+            follow(self.search_table)
+        for path in self._inserted():
+            self._twist[path] = self._search.motion[path, 7:]
+            self._load_needle(path)
+        lasting = self._search.lasting[:n]
+        if not lasting.all():
+            self._keep(lasting.nonzero()[0].tolist())
 
-    def _follows(self, c: int) -> bool:
-        owner = int(self._passages.path[c]) - len(self._needles)
-        if owner < 0:
-            return bool(follow_needle(self._passage_table, self._path_table, self._site_table, c))
-        rod = self._rods[owner]
-        return bool(
-            follow_rod(
-                self._passage_table,
-                self._path_table,
-                self._site_table,
-                self._rod_tables[owner],
-                rod.first,
-                self._before[owner],
-                c,
-            )
-        )
+    def _inserted(self) -> list[int]:
+        """The paths of needles that are in holes."""
+        paths = self._passages.path[: self._passages.filled[0]].tolist()
+        return sorted({path for path in paths if path < len(self._needles)})
 
     def _keep(self, rows: list[int]) -> None:
         """Move the passages ``rows`` to the front, and drop the others."""
@@ -211,10 +206,9 @@ class Holes:
                 array[: len(rows)] = array[rows]
         self._passages.filled[0] = len(rows)
 
-    def _read_needle(self, path: int) -> None:
-        """Take the motion of a needle and the forces on it in this tick, for the solve that moves it."""
-        body, bodies, motion = self._scene.bodies[self._needles[path]], self._bodies, self._search.motion[path]
-        self._paths.pose[path], self._twist[path] = motion[:7], motion[7:]
+    def _load_needle(self, path: int) -> None:
+        """Take the mass of a needle and the forces on it in this tick, for the solve that moves it."""
+        body, bodies = self._scene.bodies[self._needles[path]], self._bodies
         mass, inertia, self._pull[path] = bodies.attached_load(body.index)
         self._mass[path], self._inertia[path] = body.mass + mass, body.inertia + inertia
         self._pull[path, :3] += body.mass * body.gravity
@@ -274,7 +268,7 @@ class Holes:
     def reset(self) -> None:
         """Empty all holes, and search for new passages in the next tick."""
         self._clear()
-        self._countdown[0], self._turn[0], self._looked = 0, -1, False
+        self._countdown[0], self._turn[0], self._looked, self._followed = 0, -1, False, False
         self._near[:] = True
         self._gaps[:] = 0.0
         self._bodies.read_motions(self._search.watched, self._search.motion)
@@ -295,7 +289,7 @@ class Holes:
             getattr(self._passages, name)[:n] = snapshot["rows"][name]
         self._sites.pose[:], self._sites.twist[:] = snapshot["pose"], snapshot["twist"]
         put_back(self, {name: snapshot[name] for name in _KEPT})
-        self._looked = False
+        self._looked = self._followed = False
 
     def _clear(self) -> None:
         """Clear the passages, and the rows of earlier ones."""

@@ -275,7 +275,7 @@ class Rod:
         node = self.node_of[body]
         read_other_loads(self._spring_table, node, self.impulse[node], self.dt, out)
 
-    def _end_pulls(self) -> None:
+    def end_pulls(self) -> None:
         """Undo `pull_partner`."""
         nodes = self._nodes
         for i, (gravity, mass, inertia) in self._pulled.items():
@@ -458,7 +458,7 @@ class Rod:
         tick_rod(self.tick_table.ctypes.data)
         self._end_pushes()
         self.conclude()
-        self._end_pulls()
+        self.end_pulls()
 
     @property
     def tick_table(self) -> NDArray[np.int64]:

@@ -111,6 +111,11 @@ class Rods:
             self._tick_tables, self._ticks = tables, np.array(tables)
         return self._ticks
 
+    def end_pulls(self) -> None:
+        """Undo what `Rod.pull_partner` set for ticks of compiled code."""
+        for rod in self.rods:
+            rod.end_pulls()
+
     def conclude(self) -> None:
         """Take over ticks of compiled code from the arrays, and put back what diverged in the last one."""
         for rod in self.rods:

@@ -7,8 +7,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.kernels import kernel
-from ligature.suture.tracking import look_for_needles, look_for_rod, next_search
+from ligature.kernels import inlined, kernel
+from ligature.suture.passages import CAPACITY
+from ligature.suture.tracking import (
+    follow_needle,
+    follow_rod,
+    look_for_needles,
+    look_for_rod,
+    next_search,
+    open_passages,
+    open_paths,
+    open_sites,
+)
 from ligature.tables import opener
 
 Array = NDArray[np.float64]
@@ -25,8 +35,11 @@ MAX_WAIT = 32
 """Most ticks between two searches for passages."""
 
 
-SEARCHED, LOOKED, SOLVED = 1, 2, 3
-"""How far compiled code has come in `Suture.step`: holes are searched, bodies around rods are read too, all is done."""
+SEARCHED, FOLLOWED, LOOKED, SOLVED = 1, 2, 3, 4
+"""How far compiled code has come in `Suture.step`.
+
+Holes are searched; passages are followed, too; bodies around rods are read, too; all is done.
+"""
 
 
 class Search(NamedTuple):
@@ -46,6 +59,9 @@ class Search(NamedTuple):
     elements: Integers  # (r,)
     before: Array  # (r, most elements + 1) length up to each element
     dt: Array  # (1,) seconds a tick
+    mobile: Flags  # (H,) whether the hole's body moves
+    lasting: Flags  # (C,) the passages that `follow` found to last
+    reaction: Array  # (6,) scratch
 
 
 _whole, _real = np.zeros(1, np.int64), np.zeros(1)
@@ -65,6 +81,9 @@ open_search = opener(
         elements=_whole,
         before=np.zeros((1, 1)),
         dt=_real,
+        mobile=np.zeros(1, np.bool_),
+        lasting=np.zeros(CAPACITY, np.bool_),
+        reaction=np.zeros(6),
     )  # fmt: skip
 )
 
@@ -84,3 +103,39 @@ def search(table: Integers) -> None:
             s.gaps[needles + r],
         )  # fmt: skip
     s.countdown[0] = next_search(s.gaps, s.near, NEAR, MAX_APPROACH * s.dt[0], MAX_WAIT)
+
+
+@kernel
+def follow(table: Integers) -> bool:
+    """Bring all passages up to date, by ``motion`` now; whether all are `Search.lasting`."""
+    s = open_search(table)
+    p, paths, sites = open_passages(s.passages), open_paths(s.paths), open_sites(s.sites)
+    needles, whole = s.gaps.shape[0] - s.first.shape[0], True
+    for hole in range(sites.shared.shape[0]):
+        sites.shared[hole] = 0
+    for c in range(p.filled[0]):
+        hole, path = p.hole[c], p.path[c]
+        sites.shared[hole] += 1
+        place(s, sites.pose[hole], sites.twist[hole], needles + hole)
+        if path < needles:
+            for a in range(7):
+                paths.pose[path, a] = s.motion[path, a]
+    for c in range(p.filled[0]):
+        r = p.path[c] - needles
+        if r < 0:
+            s.lasting[c] = follow_needle(s.passages, s.paths, s.sites, c)
+        else:
+            s.lasting[c] = follow_rod(
+                s.passages, s.paths, s.sites, s.rods[r], s.first[r], s.before[r, : s.elements[r] + 1], c
+            )
+        whole = whole and s.lasting[c]
+    return whole
+
+
+@inlined
+def place(s: Search, pose: Array, twist: Array, row: int) -> None:
+    """Set a ``pose`` (7,) and ``twist`` (6,) to those of a row of ``motion``."""
+    for a in range(7):
+        pose[a] = s.motion[row, a]
+    for a in range(6):
+        twist[a] = s.motion[row, 7 + a]

@@ -11,7 +11,7 @@ from ligature.model.subsystem import ALWAYS, Subsystem
 from ligature.suture.bodies import SutureBodies
 from ligature.suture.holes import Holes
 from ligature.suture.rods import Rods
-from ligature.suture.searching import LOOKED, SOLVED
+from ligature.suture.searching import LOOKED, SEARCHED, SOLVED
 
 
 class Suture(Subsystem):
@@ -51,15 +51,21 @@ class Suture(Subsystem):
 
         It is until a command comes, something enters a hole or other bodies are near a rod.
         """
-        return self._idle or (self.holes.empty and self.rods.coasts)
+        return self._idle or (self.holes.coasts and self.rods.coasts)
+
+    def load_ahead(self) -> None:
+        """Prepare what compiled code takes of needles in holes; `conclude` is to follow."""
+        self.holes.load_ahead()
 
     def conclude(self, ticks: int, begun: int) -> None:
         """Take over ``ticks`` of compiled code, and how far another one has ``begun``: 0, `SEARCHED` and so on."""
         solved = begun == SOLVED
+        if solved or not begun:
+            self.rods.end_pulls()
         if ticks or solved:
             self.rods.conclude()
         if begun and not solved:
-            self.holes.look_ahead()
+            self.holes.look_ahead(followed=begun != SEARCHED)
         if begun == LOOKED:
             self.rods.colliders.look_ahead()
 
