@@ -4,7 +4,7 @@ _ligature=$(CDPATH= cd -- "$(dirname -- "${BASH_SOURCE:-$0}")" && pwd)
 export PATH="$_ligature/.venv/bin:$PATH"
 export PYTHONPATH="$_ligature/build/python:$_ligature/simulator${PYTHONPATH:+:$PYTHONPATH}"
 _names="$_ligature/simulator/ligature/client/names"
-_absent() { ! python3 -c "import sys, importlib.util; sys.exit(importlib.util.find_spec('$1') is None)"; }
+_absent() { ! python3 -c "import sys; del sys.path[0]; import importlib.util; sys.exit(importlib.util.find_spec('$1') is None)"; }
 if [ "${LIGATURE_CLIENT:-}" = own ]; then
     export PYTHONPATH="$_names/ambf:$_names/tf:$PYTHONPATH"
 else

@@ -91,7 +91,7 @@ def packages():
     """Folders in which the worker finds CoACD; none when it is nowhere. Looked up once, since panels ask for it."""
     found = importlib.util.find_spec("coacd")
     if found is not None:
-        return (str(Path(found.origin).parent.parent),)
+        return (str(Path(found.origin).resolve().parent.parent),)
     return (str(fetched()),) if (fetched() / "coacd").is_dir() else ()
 
 

@@ -90,10 +90,10 @@ def _vendor_yaml(folder: Path) -> None:
 def _download(package: str, python: str, platforms: tuple[str, ...], folder: Path) -> Path:
     """The wheel of a package, unmodified from the package index."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:"]
-    command += ["--disable-pip-version-check", "--python-version", python, "--dest", str(folder)]
+    command += ["--disable-pip-version-check", "--python-version", python, "--dest", str(folder.resolve())]
     command += [word for platform in platforms for word in ("--platform", platform)]
     before = set(folder.glob("*.whl"))
-    subprocess.run([*command, f"{package}=={WHEELS[package]}"], check=True)
+    subprocess.run([*command, f"{package}=={WHEELS[package]}"], check=True, cwd=folder)
     new = sorted(set(folder.glob("*.whl")) - before)
     return (
         new[0] if new else next(f for f in sorted(folder.glob("*.whl")) if f.name.lower().startswith(package.lower()))

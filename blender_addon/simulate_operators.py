@@ -3,6 +3,7 @@
 The motion is put on copies in a collection of its own: the scene itself stays at rest and exportable.
 """
 
+import os
 import re
 import shutil
 
@@ -24,10 +25,10 @@ def command():
     """The words that start Ligature: those of the preferences, else what the path has."""
     preferences = bpy.context.preferences.addons.get(__package__)
     words = preferences.preferences.simulator.split() if preferences else []
-    if words:
-        return words
-    found = shutil.which("ligature")
-    return [found] if found else []
+    found = words[0] if words else shutil.which("ligature")
+    if found and os.path.dirname(found):
+        found = os.path.abspath(found)  # it is started in another folder than this
+    return [found, *words[1:]] if found else []
 
 
 class ADF_OT_simulate(Waits, bpy.types.Operator):

@@ -15,7 +15,10 @@ from .steps import InSteps
 
 
 class Process:
-    """A command under way, with a folder of its own that goes with it."""
+    """A command under way in a folder of its own, which goes with it.
+
+    A Python would import from the folder that Blender was started in: files of others may lie there.
+    """
 
     def __init__(self, name, environment=None):
         self.folder = tempfile.TemporaryDirectory(prefix=f"adf-{name}-")
@@ -27,8 +30,9 @@ class Process:
         """Start the command; raises OSError when it cannot be."""
         with open(self.root / "log", "wb") as log:
             self._popen = subprocess.Popen(
-                command, stdout=log, stderr=subprocess.STDOUT, env=self._environment, stdin=subprocess.DEVNULL
-            )
+                command, stdout=log, stderr=subprocess.STDOUT, env=self._environment, stdin=subprocess.DEVNULL,
+                cwd=self.root,
+            )  # fmt: skip
 
     @property
     def finished(self):

@@ -1,6 +1,15 @@
 """Ligature: an open simulator for robot-assisted suturing."""
 
-from __future__ import annotations
+import os
+import sys
+
+if (
+    sys.argv[:1] == ["-m"]  # `python -m ligature`: what lies in the working folder is imported first, a `yaml.py` too
+    and sys.orig_argv[-len(sys.argv)].removeprefix("-m").partition(".")[0] == "ligature"
+    and not getattr(sys.flags, "safe_path", False)
+    and sys.path[0] != os.path.dirname(os.path.dirname(__file__))
+):
+    del sys.path[0]
 
 import importlib
 from typing import TYPE_CHECKING, Any

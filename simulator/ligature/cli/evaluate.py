@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from ligature.environments import SuturingEnv
 from ligature.environments.evaluation import MEASURES, UNITS, Episode, report, run_episode, run_episodes
 from ligature.environments.goals import GOALS, Goal
 from ligature.environments.policies import PolicyError, load_policy
+from ligature.environments.workers import WorkerEndedError
 from ligature.paths import check_folder
 from ligature.render import RenderUnavailable
 from ligature.render.files import write_json, write_png
@@ -51,7 +51,7 @@ def evaluate(
             shown = _drawn(policy, options, episodes[:pictures], steps, out, console)
             files.append(write_page(found, shown, out / "index.html"))
             console.print("\n".join(map(str, files)), markup=False)
-    except (PolicyError, ValueError, RenderUnavailable, BrokenExecutor) as error:
+    except (PolicyError, ValueError, RenderUnavailable, WorkerEndedError) as error:
         console.print(str(error), style="red", markup=False)
         return 2
     return 0

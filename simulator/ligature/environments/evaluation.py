@@ -5,11 +5,7 @@ Metres, radians, newtons, simulated seconds.
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -19,7 +15,7 @@ from scipy.stats import binomtest, bootstrap
 from ligature.environments.layout import ACTION
 from ligature.environments.policies import Policy, asked, checked, load_policy
 from ligature.environments.suturing import CONTROL, SuturingEnv
-from ligature.process import end_with_parent
+from ligature.environments.workers import results
 
 CONFIDENCE = 0.95
 
@@ -105,20 +101,8 @@ def run_episodes(
         yield from _episodes(name, options, seeds, max_steps)
         return
     chunks = [list(seeds[k : k + 5]) for k in range(0, len(seeds), 5)]
-    others = set(multiprocessing.active_children())
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), end_with_parent, (os.getpid(),)) as pool:
-        try:
-            # workers are born with the interrupt blocked, which a terminal sends to all: it is the parent's
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
-            results = pool.map(_chunk, [(name, dict(options), chunk, max_steps) for chunk in chunks])
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-            for found in results:
-                yield from found
-        except BaseException:  # an interrupt: the pool would wait for whole chunks
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in set(multiprocessing.active_children()) - others:
-                worker.kill()
-            raise
+    for found in results(_chunk, [(name, dict(options), chunk, max_steps) for chunk in chunks], jobs):
+        yield from found
 
 
 def _episodes(name: str, options: Mapping[str, Any], seeds: Sequence[int], max_steps: int) -> Iterator[Episode]:

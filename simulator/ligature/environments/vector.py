@@ -67,9 +67,10 @@ class SuturingVectorEnv(AsyncVectorEnv):
         if autoreset not in AUTORESET:
             raise ValueError(f"autoreset must be one of {', '.join(map(repr, AUTORESET))}, not {autoreset!r}")
         made = _Made(task, options, os.getpid())
-        super().__init__(
-            [made] * n, shared_memory=True, autoreset_mode=AUTORESET[autoreset], context=_start_method(options)
-        )
+        with _imports_of_installed():
+            super().__init__(
+                [made] * n, shared_memory=True, autoreset_mode=AUTORESET[autoreset], context=_start_method(options)
+            )
 
     def _check_spaces(self) -> None:
         with self._watched():
@@ -165,6 +166,20 @@ def _start_method(options: dict[str, Any]) -> str | None:
     from ligature.render.context import has_drawn
 
     return "spawn" if has_drawn() else None
+
+
+@contextmanager
+def _imports_of_installed() -> Iterator[None]:
+    """Have processes that are spawned in the block import nothing from the working folder; from Python 3.11 on."""
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = before or "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
 
 
 def _how(status: int) -> str:

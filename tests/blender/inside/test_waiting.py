@@ -45,6 +45,17 @@ def test_elements_of_a_thread_become_its_line(seed):
     assert [mixed[i] for i in elements_of("/x/SUTURE t", mixed)] == names
 
 
+def test_a_process_imports_nothing_from_the_folder_that_blender_was_started_in(tmp_path, monkeypatch):
+    """Which may be one of files that others made."""
+    (tmp_path / "json.py").write_text("raise SystemExit('imported')")
+    monkeypatch.chdir(tmp_path)
+    job = Process("test")
+    job.start([sys.executable, "-m", "json.tool", os.devnull])
+    while not job.finished:
+        time.sleep(0.01)
+    assert "imported" not in job.words and "Expecting value" in job.words
+
+
 def use_simulator(monkeypatch):
     python = os.environ.get("LIGATURE_PYTHON")
     if python is None:
