@@ -38,6 +38,26 @@ def own_env(ros_env: dict[str, str]) -> dict[str, str]:
     return dict(ros_env, ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}")
 
 
+@pytest.mark.parametrize("files", [20, 70, 150])
+def test_a_run_that_may_not_open_enough_files_ends_with_the_limit_and_the_remedy(
+    files: int, own_env: dict[str, str]
+) -> None:
+    """Each ROS topic takes one: wherever the start is when no more may be opened."""
+    words = [
+        "bash",
+        "-c",
+        f'ulimit -n {files}; exec "$@"',
+        "bash",
+        str(BIN / "ligature"),
+        "run",
+        str(SMALL),
+        "--no-cameras",
+    ]
+    done = subprocess.run(words, env=own_env, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and "Traceback" not in done.stdout + done.stderr
+    assert f"the system lets this process open {files} files" in done.stdout and "ulimit -n 4096" in done.stdout
+
+
 @pytest.fixture
 def watch(tmp_path: Path) -> Iterator[Callable[[dict[str, str]], Program]]:
     """Starts a client that prints wall time, sim time and step of every world state."""

@@ -9,6 +9,7 @@ found and removed by the next one. Times are seconds on the monotonic clock.
 
 from __future__ import annotations
 
+import errno
 import mmap
 import os
 import time
@@ -101,7 +102,12 @@ class Block:
         ring_at = _STATE_AT + 2 * state_bytes
         log_at = ring_at + RING_BYTES * len(PRODUCERS)
         size = log_at + LOG_BYTES
-        descriptor = os.open(path, os.O_RDWR | (os.O_CREAT | os.O_EXCL if owner else 0), 0o600)
+        try:
+            descriptor = os.open(path, os.O_RDWR | (os.O_CREAT | os.O_EXCL if owner else 0), 0o600)
+        except OSError as error:
+            if owner and error.errno in (errno.EROFS, errno.EACCES, errno.ENOENT, errno.ENOSPC):
+                raise BusError(f"cannot make the shared memory '{path}': {error.strerror}") from error
+            raise
         try:
             if owner:
                 _reserve(descriptor, path, size)

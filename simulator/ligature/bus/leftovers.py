@@ -12,7 +12,8 @@ _NAME = re.compile(r"ligature-(\d+)-[0-9a-f]+\Z")
 
 def remove(name: str) -> None:
     """Remove the block ``name``, should its owner have died without doing so."""
-    (FOLDER / name).unlink(missing_ok=True)
+    with suppress(OSError):  # such as a folder that cannot be written: then it was never made
+        (FOLDER / name).unlink(missing_ok=True)
 
 
 def remove_leftovers() -> list[str]:
@@ -21,7 +22,7 @@ def remove_leftovers() -> list[str]:
     for path in FOLDER.glob("ligature-*"):
         match = _NAME.match(path.name)
         if match and not Path(f"/proc/{match.group(1)}").exists():
-            with suppress(PermissionError, FileNotFoundError):
+            with suppress(OSError):
                 path.unlink()
                 removed.append(path.name)
     return removed

@@ -16,11 +16,12 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import NoReturn
 
+from ligature.limits import shortage, small_memory
 from ligature.process import amid_import
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -31,6 +32,15 @@ GONE = (errno.EPIPE, errno.EIO)
 
 LONG = 120
 """Characters of a path that a message quotes."""
+
+LEAST_COLUMNS, MOST_COLUMNS = 40, 1000
+"""Of lines that a command prints for a person."""
+
+_NUMBA: dict[str, Callable[[str], bool]] = {
+    "NUMBA_DISABLE_JIT": lambda value: value.strip() == "0",
+    "NUMBA_NUM_THREADS": lambda value: value.isdecimal() and 0 < int(value) <= (os.cpu_count() or 1),
+}
+"""Which values of Numba's variables kernels can be compiled with."""
 
 INTERRUPT_TIMEOUT = 1.0
 """Seconds in which the main thread takes an interrupt, wherever it is."""
@@ -52,9 +62,10 @@ def ambf_simulator() -> None:
 
 def _run(module: str) -> None:
     _open_streams()
-    _have_logs_of_ros()
-    take_interrupts()
+    _correct_settings()
     try:
+        _have_logs_of_ros()
+        take_interrupts()
         try:
             importlib.import_module(module).main()
         finally:
@@ -68,6 +79,10 @@ def _run(module: str) -> None:
         _fail(text)
     except OSError as error:
         _end(error)
+    except (MemoryError, RuntimeError, ImportError) as error:
+        if text := shortage(error):
+            _give_up(text)
+        raise
     except KeyboardInterrupt:  # before the command line is read
         end_by(signal.SIGINT)
 
@@ -144,6 +159,8 @@ def end_by(number: int) -> NoReturn:
 
 def _end(error: OSError) -> NoReturn:
     """End the command for what a file system reports about a path of the user's, or of what is printed."""
+    if text := shortage(error):
+        _give_up(text)
     if error.filename is not None:  # too long a name, a full disk, no permission
         name = os.fsdecode(error.filename)
         _fail(f"error: '{name if len(name) < LONG else name[:LONG] + '…'}': {error.strerror}")
@@ -160,6 +177,36 @@ def _fail(text: str) -> NoReturn:
 
     Console(stderr=True, highlight=False, soft_wrap=True).print(text, style="red", markup=False)
     raise SystemExit(2) from None
+
+
+def _give_up(text: str) -> NoReturn:
+    """End the process for want of what printing in colour and an end in order need as well."""
+    with suppress(OSError):
+        sys.stdout.flush()
+    sys.stderr.write(f"{text}\n")
+    sys.stderr.flush()
+    os._exit(2)
+
+
+def _correct_settings() -> None:
+    """Replace variables of the environment with which a command prints nothing, or cannot compile; report the latter.
+
+    Programs that start others without a terminal often give it 0 columns.
+    """
+    columns = os.environ.get("COLUMNS", "")
+    if columns.isdecimal():
+        wide = len(columns) > len(str(MOST_COLUMNS)) or int(columns) > MOST_COLUMNS
+        if wide or int(columns) == 0:
+            del os.environ["COLUMNS"]
+        else:
+            os.environ["COLUMNS"] = str(max(int(columns), LEAST_COLUMNS))
+    for name, usable in _NUMBA.items():
+        value = os.environ.get(name)
+        if value is not None and not usable(value):
+            del os.environ[name]
+            sys.stderr.write(f"{name}={value} is passed over: kernels cannot be compiled with it\n")
+    if text := small_memory():
+        sys.stderr.write(f"{text}\n")
 
 
 def _open_streams() -> None:

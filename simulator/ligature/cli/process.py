@@ -15,6 +15,7 @@ import ligature
 from ligature.bus import Block, BusError
 from ligature.bus.stop import Stop, stop_on_signal
 from ligature.cli.options import RunOptions
+from ligature.limits import shortage
 from ligature.model.scene import Scene
 from ligature.model.state import state_dtype
 from ligature.process import end_with_parent, report
@@ -67,6 +68,17 @@ def run_process(work: Callable[[Run], None], owner: bool = False, early: bool = 
     """
     end_with_parent()
     stop = stop_on_signal()
+    try:
+        _join(work, stop, owner, early)
+    except Exception as error:
+        if not (text := shortage(error)):
+            raise
+        report("fatal", text)
+        stop.wait(END_TIMEOUT)
+        sys.exit(2)
+
+
+def _join(work: Callable[[Run], None], stop: Stop, owner: bool, early: bool) -> None:
     gc.disable()  # nothing that a start makes is garbage: looking for it takes a fifth of the time
     options = RunOptions.from_text(sys.argv[1])
     try:
