@@ -296,7 +296,8 @@ def _meet(field: Field, points: Points, lying: Lying, e: int, radius: float) -> 
     gap, y, n = _on_face(field, q, p, lying.found, lying.corner) - radius, lying.found[0], lying.found[1]
     if r < 0:
         closing = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
-        if gap > MEET + 2.0 * max(closing, 0.0) or points.status.shape[0] - points.filled[0] <= RESERVED:
+        # What is deeper than it can have come by itself was put there: pushed out at once, it would tear at the thread.
+        if abs(gap) > MEET + 2.0 * max(closing, 0.0) or points.status.shape[0] - points.filled[0] <= RESERVED:
             return
         r = 0
         while r < MOST and lying.used[r]:
