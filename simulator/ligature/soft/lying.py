@@ -47,7 +47,8 @@ MEET, LEAVE = 0.2e-3, 0.6e-3
 """Gap in metres at which an element meets the surface, beside what it moves in a tick, and at which it leaves it."""
 
 DEEP, DEEPEST = 1e-3, 3e-3
-"""Depth in metres below which an element does not meet the surface, and below which it leaves it: it is inside."""
+"""Metres around an element in which the surface is looked for, beside what it moves in a tick; and depth below which an
+element that touches the surface leaves it: it is inside."""
 
 MOVED = 0.3e-3
 """Metres that an element slides on before it is below another place of the tissue."""
