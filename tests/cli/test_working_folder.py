@@ -95,9 +95,16 @@ def test_a_command_imports_what_is_installed(name: str, trapped: Path) -> None:
     assert not trapped.exists(), trapped.read_text()
 
 
+_FINDS = "import runpy, sys; print(*{name.partition('.')[0] for name in sys.modules})"
+_OF_PYTHON_FOR_A_MODULE = subprocess.check_output([sys.executable, "-I", "-S", "-c", _FINDS], text=True).split()
+"""What Python itself imports, from the working folder too, before the module of ``-m`` has a say."""
+
+
 @pytest.mark.parametrize("words", [["-m", "ligature"], ["-mligature"], ["-B", "-X", "utf8", "-m", "ligature.__main__"]])
 def test_the_package_as_a_command_imports_what_is_installed(words: list[str], trapped: Path) -> None:
     Path("ligature.py").unlink()  # which is what these words ask for
+    for name in _OF_PYTHON_FOR_A_MODULE:
+        Path(f"{name}.py").unlink(missing_ok=True)
     assert "none.yaml' does not exist" in output([sys.executable, *words, "check", "none.yaml"], 1)
     assert not trapped.exists(), trapped.read_text()
 
