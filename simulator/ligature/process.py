@@ -148,6 +148,11 @@ def _schedules() -> dict[int, tuple[int, os.sched_param]]:
     return found
 
 
+def ending(status: int) -> str:
+    """How a process ended, by its ``status`` as Python has it: below zero the number of a signal."""
+    return f"was ended by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"
+
+
 def report(event: str, text: str = "") -> None:
     """Report ``event`` to the parent; names of files may hold what is not UTF-8."""
     sys.stdout.write(f"@{event} {text}\n".encode("utf-8", "backslashreplace").decode())

@@ -42,10 +42,8 @@ def record(scene: str, seconds: int, path: Path) -> None:
     if sampler.returncode:
         raise SystemExit(f"py-spy ended with status {sampler.returncode}")
     # py-spy takes its own command line, with the paths of this machine, for the title
-    drawn, title = (
-        path.read_text(encoding="utf-8"),
-        f"{scene}, {seconds} s at {round(1.0 / UPDATE / 1e-3)} updates a second",
-    )
+    title = f"{scene}, {seconds} s at {1000 // UPDATE} updates a second"
+    drawn = path.read_text(encoding="utf-8")
     path.write_text(re.sub(r"[^<>]*py-spy record [^<]*", title, drawn, count=1), encoding="utf-8")
 
 

@@ -34,9 +34,7 @@ NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0/"), min_size
 FOLDERS = NAMES | st.binary(min_size=1, max_size=60).map(lambda name: name.replace(b"\0", b"%").replace(b"/", b'"'))
 
 
-def checked(
-    folder: bytes, changes: dict[str, str | None], before: str = ""
-) -> subprocess.CompletedProcess[str]:  # fmt: skip
+def checked(folder: bytes, changes: dict[str, str | None], before: str = "") -> subprocess.CompletedProcess[str]:
     """``ligature check`` of a sound scene in ``folder``, started by a shell after the words ``before``."""
     os.makedirs(folder, exist_ok=True)
     with open(os.path.join(folder, b"scene.yaml"), "w") as file:

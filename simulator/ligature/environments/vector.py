@@ -18,6 +18,7 @@ from gymnasium.vector.async_vector_env import AsyncState
 
 from ligature.environments.layout import numbers_of
 from ligature.environments.suturing import SuturingEnv
+from ligature.process import ending
 
 AUTORESET = {"next step": AutoresetMode.NEXT_STEP, "same step": AutoresetMode.SAME_STEP, "off": AutoresetMode.DISABLED}
 """When an environment whose episode ended begins the next one; see Gymnasium's ``AutoresetMode``."""
@@ -136,7 +137,7 @@ class SuturingVectorEnv(AsyncVectorEnv):
         while all(process.exitcode is None for process in self.processes) and time.monotonic() < deadline:
             time.sleep(0.01)
         ended = [
-            f"environment {k} of {self.num_envs} (process {process.pid}) {_how(process.exitcode)}"
+            f"environment {k} of {self.num_envs} (process {process.pid}) {ending(process.exitcode)}"
             for k, process in enumerate(self.processes)
             if process.exitcode is not None
         ]
@@ -180,8 +181,3 @@ def _imports_of_installed() -> Iterator[None]:
             del os.environ["PYTHONSAFEPATH"]
         else:
             os.environ["PYTHONSAFEPATH"] = before
-
-
-def _how(status: int) -> str:
-    """How a process ended."""
-    return f"was ended by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"

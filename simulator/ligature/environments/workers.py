@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import Any
 
-from ligature.process import end_with_parent, program
+from ligature.process import end_with_parent, ending, program
 
 
 class WorkerEndedError(RuntimeError):
@@ -60,8 +60,7 @@ class _Worker:
         self.pipe.close()
 
     def _ended(self) -> WorkerEndedError:
-        status = self._process.wait()
-        how = f"was ended by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"
+        how = ending(self._process.wait())
         return WorkerEndedError(f"process {self._process.pid}, one of those that share the work, {how}")
 
 
