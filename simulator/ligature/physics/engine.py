@@ -174,21 +174,26 @@ class Engine:
         return found
 
     def _measure(self) -> None:
-        """Find how far anything of a tree is from what it turns about, with sliding joints at 0, for `Boxes.reach`."""
+        """Find how far anything is from the joint or base that moves it, for `Trees.far`."""
         motions, arrays = self.motions, self.motions.trees
         if not len(arrays.boxes.at):
             return
         motions.everything()
-        for k, tree in enumerate(self.trees):
-            rows = slice(arrays.begin[k], arrays.begin[k + 1])
-            chain = np.linalg.norm(arrays.fixed[rows, 3:6], axis=1) + np.linalg.norm(arrays.fixed[rows, 10:13], axis=1)
-            reach = 0.0
-            for uid, link, group, mask in self._colliders:
-                if uid == tree.uid and (group, mask) != VOID:
-                    corners = np.array(pybullet.getAABB(uid, link, physicsClientId=self.client))
-                    farthest = np.abs(corners - motions.pose[motions.row(k, link), :3]).max(axis=0)
-                    reach = max(reach, float(np.linalg.norm(farthest)))
-            arrays.boxes.reach[k] = chain.sum() + reach
+        far = arrays.far
+        far[:] = 0.0
+        for uid, link, group, mask in self._colliders:
+            tree = next((k for k, tree in enumerate(self.trees) if tree.uid == uid), None)
+            if tree is not None and (group, mask) != VOID:
+                row = motions.row(tree, link)
+                corners = np.array(pybullet.getAABB(uid, link, physicsClientId=self.client))
+                farthest = np.abs(corners - motions.pose[row, :3]).max(axis=0)
+                far[row] = max(far[row], float(np.linalg.norm(farthest)))
+        far += np.linalg.norm(arrays.fixed[:, 10:13], axis=1)
+        offset = np.linalg.norm(arrays.fixed[:, 3:6], axis=1)
+        for row in range(len(far) - 1, -1, -1):  # parents come before their children
+            parent = arrays.rows[row, 0]
+            if parent >= 0:
+                far[parent] = max(far[parent], offset[row] + far[row])
         motions.forget_all()
 
     def collide(self, uid: int, group: int, mask: int) -> None:

@@ -47,7 +47,6 @@ class Boxes(NamedTuple):
     owner: Integers  # (n,) what each belongs to
     tree: Integers  # (n,)
     row: Integers  # (s,) which of these each place of the broad phase has, -1 is another
-    reach: Array  # (k,) how far anything of a tree is from what it turns about, at most, with sliding joints at 0
     moved: Array  # (k,) how far any point of a tree has moved since its boxes were compared, at most
     parked: Flags  # (k,) whether a tree is where it was then
     out: Flags  # (n,) what is taken out in this tick
@@ -59,8 +58,7 @@ def boxes(trees: int, count: int = 0, places: int = 0) -> Boxes:
     z, whole = np.zeros, np.int64
     return Boxes(
         phase=z(1, whole), at=z(count, whole), owner=z(count, whole), tree=z(count, whole), row=np.full(places, -1),
-        reach=np.full(trees, np.inf), moved=np.full(trees, np.inf), parked=z(trees, np.bool_), out=z(count, np.bool_),
-        last=z(1, whole),
+        moved=np.full(trees, np.inf), parked=z(trees, np.bool_), out=z(count, np.bool_), last=z(1, whole),
     )  # fmt: skip
 
 

@@ -77,6 +77,7 @@ class Trees(NamedTuple):
     sent_effort: Array  # (a,)
     rows: Integers  # (r, 3) parent row, type and axis of the joint
     fixed: Array  # (r, 17) axis of the joint, link frame in its parent's at zero, inertial frame in the link frame
+    far: Array  # (r,) how far anything that its joint moves is from that at most, with sliding joints beyond at 0
     mass: Array  # (r,)
     inertia: Array  # (r, 3) principal moments
     pose: Array  # (r, 7)
@@ -107,7 +108,7 @@ def trees(count: int, rows: int, axes: int, sleepers: int = 0, compared: Boxes |
         quiet=z(count, no), still=z(count, no), asleep=z(count, no), sleepers=z(sleepers, whole),
         sleepers_begin=z(count + 1, whole), before=z(axes), last_motor=np.full((2, axes), np.nan),
         link=z(axes, whole), limp=np.ones(axes, no), sent=z(axes, no), sent_effort=z(axes),
-        rows=np.full((rows, 3), -1), fixed=z((rows, 17)), mass=z(rows), inertia=z((rows, 3)),
+        rows=np.full((rows, 3), -1), fixed=z((rows, 17)), far=np.full(rows, np.inf), mass=z(rows), inertia=z((rows, 3)),
         pose=z((rows, 7)), twist=z((rows, 6)), frame=z((rows, 7)), speed=z((rows, 6)), joints=z((3, axes)),
         reaction=z((axes, 6)), force=z((rows, 3)), load=z((rows, 6)), push=z(axes), answer=answer,
         wanted=wanted, wanted_at=np.array([wanted.ctypes.data]), boxes=compared or boxes(count),
@@ -206,20 +207,24 @@ def _read_moved(handle: int, trees: Trees, k: int) -> None:
 @inlined
 def _moved(trees: Trees, k: int) -> float:
     """How far any point of tree ``k`` has moved in a tick at most, since `Trees.wanted` and `Trees.before`."""
-    old, new, reach = trees.wanted, trees.pose[trees.begin[k]], trees.boxes.reach[k]
+    begin = trees.begin[k]
+    old, new = trees.wanted, trees.pose[begin]
     shift, one, other = 0.0, 0.0, 0.0
     for a in range(3):
         shift += (new[a] - old[a]) ** 2
     for a in range(3, 7):
         one, other = one + (new[a] - old[a]) ** 2, other + (new[a] + old[a]) ** 2
-    for r in range(trees.begin[k] + 1, trees.begin[k + 1]):
+    moved, slid = math.sqrt(shift), 0.0
+    for r in range(trees.begin[k + 1] - 1, begin, -1):  # what a joint moves comes after it
         joint = trees.rows[r, 2]
-        if joint >= 0 and trees.rows[r, 1] == SLIDES:
-            reach += max(abs(trees.joints[0, joint]), abs(trees.before[joint]))
-    moved = math.sqrt(shift) + reach * TURN_PER_CHORD * math.sqrt(min(one, other))
-    for i in range(trees.first[k], trees.first[k + 1]):
-        moved += max(reach, 1.0) * abs(trees.joints[0, i] - trees.before[i])
-    return moved
+        if joint >= 0:
+            now, before = trees.joints[0, joint], trees.before[joint]
+            if trees.rows[r, 1] == SLIDES:
+                moved += abs(now - before)
+                slid += max(abs(now), abs(before))
+            else:
+                moved += (trees.far[r] + slid) * abs(now - before)
+    return moved + (trees.far[begin] + slid) * TURN_PER_CHORD * math.sqrt(min(one, other))
 
 
 @inlined
