@@ -92,6 +92,8 @@ CACHES: dict[str, str] = {
     **dict.fromkeys(("Courses.table", "CourseArrays.own", "CourseArrays.aim"), "addresses of arrays"),
     "Rod._spring_table": "addresses of arrays",
     "Rod.springs": "written by every tick that tissue takes part in",
+    "Rod._lent": "counted anew by every tick that meets the rod, before it is read",
+    "Run.chain": "follows from the rod and its needle",
     # soft tissue
     "ElasticGrid._responses": "follows from the grid",
     "Field.found": "counts how often boxes were found",

@@ -210,3 +210,31 @@ def test_data_that_make_no_thread_are_reported(tmp_path: Path, old: str, new: st
     scene = load(tmp_path, NEEDLE + SILK.replace(old, new))
     assert scene.rods == ()
     assert text in "\n".join(str(d) for d in scene.diagnostics if d.severity >= Severity.ERROR)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_thread_leads_along_its_way_and_straight_on_beyond_it(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    turns = rng.uniform(-0.5, 0.5, (12, 3))
+    way = 0.01 * np.cumsum(np.array([0.0, 0.0, 1.0]) + turns, axis=0)
+    listed = ", ".join(f"{{x: {x}, y: {y}, z: {z}}}" for x, y, z in way.tolist())
+    path = tmp_path / "silk.yaml"
+    path.write_text(
+        "sutures: [SUTURE silk]\nnamespace: /ambf/env/\n"
+        f"SUTURE silk: {{name: silk, length: 0.4, diameter: 0.0005, elements: 200, way: [{listed}], location: "
+        "{position: {x: 0.1, y: 0.2, z: 0.3}, orientation: {r: 0, p: 0, y: 0}}}\n"
+    )
+    scene = ligature.load(path)
+    poses = np.array([scene.bodies[body].T_world_body for body in scene.rods[0].bodies])
+    half = 0.001 * poses[:, :3, 2]
+    begins, ends = poses[:, :3, 3] - half, poses[:, :3, 3] + half
+    np.testing.assert_allclose(begins[0], [0.1, 0.2, 0.3], atol=1e-12)
+    np.testing.assert_allclose(begins[1:], ends[:-1], atol=1e-9)
+    corners = np.vstack([np.zeros(3), way]) + [0.1, 0.2, 0.3]
+    edges = np.diff(corners, axis=0)
+    share = np.clip(((ends[:, None] - corners[:-1]) * edges).sum(axis=2) / (edges**2).sum(axis=1), 0.0, 1.0)
+    away = np.linalg.norm(ends[:, None] - corners[:-1] - share[..., None] * edges, axis=2).min(axis=1)
+    on = int(np.linalg.norm(edges, axis=1).sum() / 0.002)
+    # Chords cut corners, so that fewer elements are on it than its length has; a turn below 1 mrad is not made.
+    assert away[: on - 6].max() < 1e-3 * 0.002
+    np.testing.assert_allclose(poses[on + 2 :, :3, 2], poses[-1, :3, 2][None].repeat(198 - on, axis=0), atol=1e-9)

@@ -1,7 +1,7 @@
 """Threads by physical data: length, size and material become the bodies and joints of one rod.
 
-The thread starts at its ``location`` and leaves along +z of it. SI units; frames as in
-`ligature.model.scene`.
+The thread starts at its ``location`` and leaves along +z of it, or leads through the points of its ``way`` in that
+frame. SI units; frames as in `ligature.model.scene`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ligature.adf import Diagnostic, Element, Severity
+from ligature.adf.frames import minimal_rotation
 from ligature.model.frames import Array, frame, pose_matrix
 from ligature.model.geometry import GeometryError
 from ligature.model.scene import Body, Identity, Joint, JointType, SixDof
@@ -45,8 +46,9 @@ def thread(
     across = mass * (length**2 / 12 + radius**2 / 4)
     colour = _colour(element)
     bodies = []
+    places = _way(element, n, length)
     for i in range(n):
-        T = T_world_start @ frame(np.eye(3), (0.0, 0.0, (i + 0.5) * length))
+        T = T_world_start @ places[i]
         shape = (Collider(Capsule(radius, length + 2 * radius), np.eye(4)),)
         bodies.append(
             Body(
@@ -69,6 +71,30 @@ def thread(
     if parent is not None:
         joints.append(_swage(element, identity, first_joint + n - 1, parent, bodies[0], length))
     return bodies, joints
+
+
+def _way(element: Element, n: int, length: float) -> list[Array]:
+    """Poses (4, 4) of ``n`` elements of a length in the frame of ``location``: straight, or along the suture's ``way``.
+
+    Each ends where the way is first as far from its beginning as it is long; beyond the way they go straight on.
+    """
+    points = np.array([[point.number(axis) for axis in "xyz"] for point in element.children("way")]).reshape(-1, 3)
+    if not len(points):
+        return [frame(np.eye(3), (0.0, 0.0, (i + 0.5) * length)) for i in range(n)]
+    at, R, places, edge, corners = np.zeros(3), np.eye(3), [], 0, np.vstack([np.zeros(3), points])
+    for _ in range(n):
+        way = R[:, 2]
+        while edge < len(points):
+            if np.linalg.norm(corners[edge + 1] - at) >= length:
+                a, d = corners[edge] - at, corners[edge + 1] - corners[edge]
+                b, c = a @ d / (d @ d), (a @ a - length**2) / (d @ d)
+                way = (a + (math.sqrt(b * b - c) - b) * d) / length
+                break
+            edge += 1
+        R = minimal_rotation(R[:, 2], way / np.linalg.norm(way)) @ R
+        places.append(frame(R, at + 0.5 * length * R[:, 2]))
+        at = at + length * R[:, 2]
+    return places
 
 
 def _colour(element: Element) -> Colour:

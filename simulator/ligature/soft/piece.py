@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import kernel
+from ligature.model.frames import inverse
 from ligature.model.scene import Scene
 from ligature.model.soft import TissueBody
 from ligature.model.state import MAX_INSERTIONS, MAX_PUNCTURES, StateRecord
@@ -60,6 +61,8 @@ class Piece:
         self._carried = [p for p in self.piercers if p.rod is not None]
         self._alone = [p for p in self.piercers if p.rod is None]
         self.threads = [SceneThread(p.rod, p, self.block, self.frame) for p in self._carried if p.rod is not None]
+        self._sewn = [SceneThread(rod, None, self.block, self.frame) for rod in rods if self._is_stitched(rod)]
+        self.threads += self._sewn
         self.lying = [self._lay(rod) for rod in rods]
         self.contacts = BodyContacts(scene, tissue.body, self.block, bodies, self.piercers, dt)
         self._floating = Floating(self._body, self.block) if self.block.elastic.floats else None
@@ -67,6 +70,20 @@ class Piece:
         self._index, self._motion = np.array([tissue.body]), np.zeros((1, 13))
         self._read()
         self.frame.restart()
+        self._sew()
+
+    def _is_stitched(self, rod: Rod) -> bool:
+        """Whether a rod without a needle starts in the tissue."""
+        if any(thread.rod is rod for thread in self.threads):
+            return False
+        T = inverse(self._body.T_world_body)
+        places = (T @ start for start in rod.description.T_world_inertial)
+        return any(self.block.contains(np.ascontiguousarray(place[:3, 3])) for place in places)
+
+    def _sew(self) -> None:
+        """Have the threads that start in the tissue pass through it."""
+        for thread in self._sewn:
+            thread.sew(self.block, self._body.T_world_body)
 
     def _lay(self, rod: Rod) -> LyingThread:
         """The rod on the surface of the tissue."""
@@ -193,6 +210,7 @@ class Piece:
         self.wrench[:], self.peak[:] = 0.0, 0.0
         self._read()
         self.frame.restart()
+        self._sew()
 
     def snapshot(self) -> dict[str, Any]:
         """Everything that lasts from tick to tick."""

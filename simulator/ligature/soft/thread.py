@@ -26,6 +26,10 @@ Tables = tuple[Integers, Integers, Integers, Integers, Integers, Integers]
 """Of the tissue, its strand, the run, the rod's nodes and springs, and the frame."""
 
 
+FINE = 10
+"""Places of an element at which it is seen whether it starts in tissue."""
+
+
 class Run(NamedTuple):
     """A rod of n elements as a chain of points from the needle on."""
 
@@ -47,14 +51,15 @@ open_run = opener(_run(1, 0, False))
 
 
 class SceneThread:
-    """One rod and one body of tissue in its ``frame``; ``piercer`` is the needle whose path it follows."""
+    """One rod and one body of tissue in its ``frame``; ``piercer`` is the needle whose path it follows, if any."""
 
-    def __init__(self, rod: Rod, piercer: ScenePiercer, block: TissueBlock, frame: Frame) -> None:
+    def __init__(self, rod: Rod, piercer: ScenePiercer | None, block: TissueBlock, frame: Frame) -> None:
         self.rod, self._piercer = rod, piercer
         self.inside = block.add_thread(float(rod.description.radius.min()))
-        first = next(a for a in rod.description.attachments if a.body == piercer.body.index)
         # The thread's first point is at the needle's tail.
-        self.turned = first.element > 0
+        self.turned = False
+        if piercer is not None:
+            self.turned = next(a for a in rod.description.attachments if a.body == piercer.body.index).element > 0
         self._run = _run(len(rod.description.mass), rod.first, self.turned)
         self._tables = (
             block.interface.table, self.inside.table, table_of(self._run), table_of(rod.nodes), rod.spring_table,
@@ -71,9 +76,25 @@ class SceneThread:
         """Element of the rod that a segment of the thread is."""
         return len(self.rod.description.mass) - 1 - segment if self.turned else segment
 
+    def sew(self, block: TissueBlock, T_world_body: Array) -> None:
+        """Make a path through the tissue, at rest at a pose (4, 4), wherever the rod starts in it."""
+        made, radius = self.rod.description, self.inside.radius
+        ends, frames = [*made.ends[:, 0], made.ends[-1, 1]], [*made.T_world_inertial, made.T_world_inertial[-1]]
+        line = np.array([T[:3, :3] @ end + T[:3, 3] for T, end in zip(frames, ends, strict=True)])
+        line = (line - T_world_body[:3, 3]) @ T_world_body[:3, :3]
+        at = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
+        fine = np.linspace(0.0, at[-1], FINE * len(line))
+        points = np.column_stack([np.interp(fine, at, column) for column in line.T])
+        within = np.array([block.contains(point) for point in points])
+        for run in np.split(np.arange(len(fine)), np.flatnonzero(np.diff(within)) + 1):
+            if within[run[0]]:
+                nodes = run[np.linspace(0, len(run) - 1, max(2, round(len(run) / FINE) + 1)).round().astype(int)]
+                # A path leads to its exit; the thread's first point has left there.
+                self.inside.insert(block.lay_path(points[nodes[::-1]], radius), fine[nodes[0]])
+
     def begin(self, dt: float) -> None:
         """Hand the rod what the tissue does to it."""
-        if self._piercer.met:
+        if self._piercer is not None and self._piercer.met:
             self.inside.draw_in(self._piercer.inside)
         self._holds = bool(hold(self._tables, dt))
 

@@ -95,6 +95,10 @@ class TissueBlock:
                     self.interface.release(i)
                 paths.count[path], paths.length[path], self.ages[path] = 0, np.inf, 0
 
+    def contains(self, place: Array) -> bool:
+        """Whether a place (3,) is in the tissue as it is now."""
+        return int(locate(self.elastic.x, self.elastic.grid.cells, place, 0.0, np.zeros(8))) >= 0
+
     def lay_path(self, places: Array, radius: float) -> int:
         """Make a way through the tissue, for needles and threads of ``radius`` metres; returns the path.
 

@@ -360,5 +360,9 @@ SUTURE = (
     Key("friction", N, 0.3, doc="friction coefficient"),
     Key("location", POSE, POSE_ZERO, "m, rad", "pose of the start; the thread leaves along +z"),
     Key("parent", T, "", doc="body that the start is fixed to; `location` is then in its frame"),
+    Key(
+        "way", Type.MAPS, doc="points in the frame of `location` that the thread leads through from its start at first"
+    ),
+    *each(("x", "y", "z"), N, "way[].{}", unit="m", doc="{} of the point", required=True),
     *(key for key in COLOUR if key.path.startswith("color rgba")),
 )
