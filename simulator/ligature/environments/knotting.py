@@ -82,6 +82,9 @@ def knot_tie(hand: Hand, observation: Array) -> Iterator[Array]:
 class Knotter(Tier):
     """Both hands, and the thread."""
 
+    UP, LOCKED = HELD_UP, LOCK
+    """As `HELD_UP` and `LOCK`."""
+
     def knot(self) -> Iterator[Array]:
         """All of the knot, both of its ends drawn, each in a hand."""
         yield from self.first()
@@ -104,7 +107,7 @@ class Knotter(Tier):
         """The right tool draws the long end over the short one, to its own side, where it goes around the tool."""
         left = CARRY * MIRRORED
         above, behind = (self.at(HOOK, ACROSS, place) for place in BEHIND)
-        yield from self.together(self.go(LEFT, self.at(left, AWAY, HELD_UP), SHUT, SLOW), self.go(RIGHT, above, SHUT))
+        yield from self.together(self.go(LEFT, self.at(left, AWAY, self.UP), SHUT, SLOW), self.go(RIGHT, above, SHUT))
         yield from self.go(RIGHT, behind, SHUT, SLOW)
         for place, follows in HOOKED:
             way = self.go(RIGHT, self.at(HOOK, ACROSS, np.array(place)), SHUT, SLOW)
@@ -152,7 +155,7 @@ class Knotter(Tier):
         """Both hands draw, each at its end, until both bear what locks the knot."""
         for _ in range(3):
             ways = (
-                self.go(n, self.turned(n, APART[n]), SHUT, SLOWEST, lambda n=n: self.pull(n) > LOCK)  # type: ignore[misc]
+                self.go(n, self.turned(n, APART[n]), SHUT, SLOWEST, lambda n=n: self.pull(n) > self.LOCKED)  # type: ignore[misc]
                 for n in (RIGHT, LEFT)
             )
             yield from self.together(*ways)

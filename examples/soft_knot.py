@@ -1,0 +1,267 @@
+"""A square knot over a wound in soft tissue: two arms make it, let go, and wait.
+
+In the scene `soft_knot` a thread is already stitched through both lips of a wound that gapes, its short end in a clip.
+The program makes the throws of the expert of `ligature/KnotTie-v0`, with other places: the first throw is drawn just
+until it lies on the tissue, since one that is drawn hard locks too far above it; the wound closes with the second
+throw, and both ends drawn apart lock the knot. It finds its way by the ground truth of the simulation. Run it with
+``--help``. World axes, metres, radians, newtons, seconds of simulated time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import ligature
+import numpy as np
+from ligature.environments.actions import ArmActions
+from ligature.environments.goals.ligating import LEFT, Ligating, holding
+from ligature.environments.hand import SHUT, Hand
+from ligature.environments.knotting import Knotter
+from ligature.environments.layout import ACTION
+from ligature.environments.reading import ArmReading
+from ligature.environments.tying import AWAY, DRAW, SLOW, Missed
+from ligature.model.scene import Body, Scene
+from ligature.robots.psm_arm import PsmArm
+from ligature.tasks.diagrams import Diagram
+from ligature.tasks.knots import SQUARE_KNOT, extended
+from ligature.tasks.wounds import Wound
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from suture import Failure, Film  # noqa: E402
+
+Array = np.ndarray
+
+SCENE = Path(__file__).resolve().parents[1] / "scenes" / "soft_knot" / "launch.yaml"
+
+CONTROL = 20
+"""Ticks of an action."""
+
+HOLDS = 10
+"""Seconds that the knot must hold when nothing holds it."""
+
+BEHIND, ASIDE = 0.003, 0.005
+"""How far below the tissue's surface the axis of the vessel would be for which the expert makes its throws, and how
+far from where the short end comes out."""
+
+ABOVE = 3e-4
+"""How far above the surface a thread is that has come out."""
+
+STRANDS = 3
+"""Elements of a thread above the surface from which on what comes after is another strand at it."""
+
+DRAWN, TAUT, CLOSE = ((-0.016, -0.002, 0.014), (-0.066, -0.020, 0.020)), 0.4, 0.040
+"""Where the first throw is drawn, from the vessel's axis, until the long end bears so many newtons, and the loop is no
+longer than that."""
+
+DISPLACED = np.array([-0.0015, 0.0010, 0.0])
+"""Where the first throw then lies, from where it would lie at the vessel."""
+
+FRICTION, STIFFNESS = (0.5, 0.6), (0.9, 1.1)
+"""Of random seeds: the thread's friction, and a factor of the tissue's stiffness."""
+
+
+class Sewn(Ligating):
+    """What the expert sees of a task, with a stitch through both lips of a wound in place of a vessel."""
+
+    scene, HELD = "soft_knot", 32
+    OVER = np.array([-0.03, 0.04, 0.02]), np.array([-0.015, 0.045, 0.02]), np.array([0.0, 0.045, 0.014])
+
+    def _prepare(self) -> None:
+        scene = self._simulation.scene
+        self.wound, rod = Wound.of(scene), scene.rods[0]
+        self.elements, self.length = list(rod.bodies), float(rod.lengths.mean())
+        self.body, self.thickness, self.radius = self.elements[-1], 2.0 * rod.radius, ASIDE
+        self._surface = float(self.wound.point(self._simulation.state[0], 1, 0.0, 0.0)[1])
+        points = np.array([scene.bodies[body].T_world_body[:3, 3] for body in self.elements])
+        out = points[np.flatnonzero(points[:, 1] < self._surface)[0]]
+        self.vessel = np.array([out[0] - ASIDE - 0.5 * self.thickness, self._surface - BEHIND, out[2]])
+        self._round = 2.0 * np.pi * (self.radius + 0.5 * self.thickness)
+
+    def beside(self, points: Array) -> int:
+        """The element at which the short end comes out of the tissue."""
+        inside = points[:, 1] < self._surface + ABOVE
+        return max(int(inside.argmax()) - 1, 0) if inside.any() else len(points) // 3
+
+    def leaves(self, points: Array) -> int:
+        """The element at which the long end comes out of the tissue."""
+        low = self.beside(points)
+        inside = np.flatnonzero(points[low:, 1] < self._surface + ABOVE)
+        ends = np.append(np.diff(inside) > STRANDS, True)
+        return low + (int(inside[ends.argmax()]) if len(inside) else 0) + 1
+
+
+class Knotting(Knotter):
+    """Both hands, and the thread, over soft tissue."""
+
+    UP, LOCKED = np.array([-0.031, 0.047, 0.039]), 6.0
+
+    def draw(self) -> Iterator[Array]:
+        """The left hand draws the first throw until it lies on the tissue, and no further."""
+        for place in DRAWN:
+            T = holding(DRAW, AWAY, self.goal.vessel + place)
+            yield from self.go(LEFT, T, SHUT, SLOW, self.lies)
+
+    def lies(self) -> bool:
+        """Whether the first throw is drawn close enough."""
+        pull, loop = self.pull(LEFT), self.goal.loop(self.goal.points())
+        length = np.inf if loop is None else (loop[1] - loop[0]) * self.goal.length
+        return pull > TAUT and length < CLOSE
+
+
+class Theatre:
+    """Both arms and the thread, in place of an environment."""
+
+    needle = 0
+
+    def __init__(self, simulation: ligature.Simulation, seed: int, watch: Callable[[], object] = lambda: None) -> None:
+        self.simulation, self._watch = simulation, watch
+        self.arms = tuple(arm for name in Sewn.arms if isinstance(arm := simulation.arms[name], PsmArm))
+        self.readings = tuple(ArmReading(simulation, arm) for arm in self.arms)
+        self._actions = [
+            ArmActions(arm, reading, "cartesian") for arm, reading in zip(self.arms, self.readings, strict=True)
+        ]
+        self.goal = Sewn(simulation, self.arms)
+        self.goal.settle()
+        if seed:
+            self.goal.begin(np.random.default_rng(seed))
+
+    @property
+    def gap(self) -> float:
+        """Width of the wound at the stitch."""
+        return self.goal.wound.gap(self.simulation.state[0], 0.0)
+
+    def run(self, actions: Iterator[Array]) -> None:
+        """Have both arms act."""
+        for action in actions:
+            for arm, own in zip(self._actions, np.clip(action, -1.0, 1.0).reshape(-1, ACTION), strict=True):
+                arm.act(own)
+            self.simulation.step(CONTROL)
+            self._watch()
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+        for _ in range(round(seconds / (CONTROL * self.simulation.dt))):
+            self.simulation.step(CONTROL)
+            self._watch()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How well it went.
+
+    Parameters
+    ----------
+    kind
+        Determinant, signature and three-colourings of the knot in the thread, its ends continued straight.
+    gaps
+        Width of the wound at the stitch in metres: at first, with both ends drawn, when the hands have let go, and
+        `HOLDS` seconds later.
+    sewn, hands_empty
+        Whether the thread still passes through both lips, and no jaw holds anything.
+    time
+        Simulated seconds until the end.
+    stopped
+        Why the program gave up, if it did.
+    """
+
+    kind: tuple[int, int, int]
+    gaps: tuple[float, ...]
+    sewn: bool
+    hands_empty: bool
+    time: float
+    stopped: str = ""
+
+    @property
+    def success(self) -> bool:
+        """Whether a square knot holds the lips more than half way together, and has not slipped by 0.1 mm."""
+        if self.stopped or self.kind != SQUARE_KNOT or not (self.sewn and self.hands_empty):
+            return False
+        first, _, free, last = self.gaps
+        return last < 0.5 * first and last - free < 1e-4
+
+    def lines(self) -> list[str]:
+        """One figure a line."""
+        names = ["at first", "both ends drawn", "hands let go", f"{HOLDS} s later"]
+        if self.stopped:
+            names[len(self.gaps) - 1 :] = ["when it stopped"]
+        determinant, signature, colourings = self.kind
+        return [
+            f"{'a' if self.success else 'no'} square knot that holds the lips, in {self.time:.1f} s",
+            f"determinant {determinant}, signature {signature}, {colourings} three-colourings",
+            *(f"gap {1e3 * gap:.2f} mm, {name}" for name, gap in zip(names, self.gaps, strict=True)),
+        ]
+
+
+def scattered(scene: Scene, seed: int) -> Scene:
+    """The thread more or less smooth, the tissue more or less stiff; seed 0 leaves both."""
+    if seed == 0:
+        return scene
+    rng = np.random.default_rng(seed)
+    friction, stiffness = float(rng.uniform(*FRICTION)), float(rng.uniform(*STIFFNESS))
+    thread, tissue = set(scene.rods[0].bodies), scene.tissues[0].body
+
+    def other(body: Body) -> Body:
+        if body.index in thread:
+            return replace(body, friction=friction)
+        if body.index != tissue or body.tissue is None:
+            return body
+        materials = tuple(replace(material, youngs=stiffness * material.youngs) for material in body.tissue.materials)
+        return replace(body, tissue=replace(body.tissue, materials=materials))
+
+    return replace(scene, bodies=type(scene.bodies)([other(body) for body in scene.bodies]))
+
+
+def operate(simulation: ligature.Simulation, seed: int = 0, watch: Callable[[], object] = lambda: None) -> Outcome:
+    """Make the knot, let go, wait; returns how well it went."""
+    try:
+        theatre = Theatre(simulation, seed, watch)
+    except ValueError as error:  # the jaws do not hold the thread
+        raise Failure(str(error)) from error
+    env: Any = theatre
+    knotter, goal, stopped = Knotting(Hand(env, 0)), theatre.goal, ""
+    gaps = [theatre.gap]
+    try:
+        theatre.run(knotter.first())
+        goal.vessel = goal.vessel + DISPLACED
+        for step in (knotter.second, knotter.draw_second, knotter.take_short_end, knotter.draw_apart):
+            theatre.run(step())
+        gaps.append(theatre.gap)
+        theatre.run(knotter.let_go())
+        gaps.append(theatre.gap)
+        theatre.wait(HOLDS)
+    except (Missed, ValueError) as error:
+        stopped = str(error)
+    gaps.append(theatre.gap)
+    kind = Diagram.of(extended(goal.points() - goal.vessel, np.zeros(3))).kind
+    empty = all(simulation.grasps[arm.name] is None for arm in theatre.arms)
+    sewn = goal.wound.stitch(simulation.state[0], 0.0) is not None
+    return Outcome(kind, tuple(gaps), sewn, empty, simulation.time, stopped)
+
+
+def main() -> int:
+    """Make a knot and print how well it went."""
+    arguments = argparse.ArgumentParser(description="Two arms make a square knot over a wound in soft tissue.")
+    arguments.add_argument("--seed", type=int, default=0, help="hands, friction and stiffness; 0 is the scene's own")
+    arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
+    given = arguments.parse_args()
+    if given.seed < 0:
+        arguments.error("--seed is at least 0")
+    simulation = ligature.Simulation(scattered(ligature.load(SCENE), given.seed))
+    film = Film(simulation, given.out) if given.out else None
+    try:
+        outcome = operate(simulation, given.seed, film.watch if film else lambda: None)
+    except Failure as failure:
+        sys.exit(f"error: {failure}")
+    print("\n".join([f"stopped: {outcome.stopped}"] * bool(outcome.stopped) + outcome.lines()))
+    if film is not None:
+        print(film.save())
+    return 0 if outcome.success else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,35 @@
+"""The program that makes a square knot over a wound in soft tissue with two arms."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import ligature
+import pytest
+from ligature.tasks.knots import SQUARE_KNOT
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+sys.path.insert(0, str(EXAMPLES))
+
+import soft_knot  # noqa: E402
+
+GOOD = soft_knot.Outcome(SQUARE_KNOT, (4e-3, 0.0, 1.50e-3, 1.55e-3), True, True, 60.0)
+
+
+def test_a_knot_counts_where_it_is_square_and_holds_the_lips_by_itself() -> None:
+    assert GOOD.success
+    granny, slips, gapes = (9, 4, 27), (4e-3, 0.0, 1.5e-3, 1.7e-3), (4e-3, 0.0, 2.1e-3, 2.1e-3)
+    for bad in (
+        {"kind": granny}, {"gaps": slips}, {"gaps": gapes}, {"sewn": False}, {"hands_empty": False}, {"stopped": "lost"}
+    ):  # fmt: skip
+        assert not replace(GOOD, **bad).success
+
+
+@pytest.mark.slow
+def test_two_arms_make_a_square_knot_that_holds_the_lips_for_ten_seconds() -> None:
+    simulation = ligature.Simulation(ligature.load(soft_knot.SCENE))
+    outcome = soft_knot.operate(simulation)
+    assert outcome.success, outcome.lines()
+    assert outcome.gaps[0] == pytest.approx(4e-3, abs=0.1e-3)
