@@ -196,7 +196,10 @@ def test_jaws_that_search_hold_and_let_go_while_coasting_have_the_bits_of_those_
     assert carried > 100
 
 
-@pytest.mark.parametrize(("task", "seed", "noise"), [("insert", 2, 0.3), ("pull_through", 0, 0.3), ("suture", 0, 0.3)])
+@pytest.mark.parametrize(
+    ("task", "seed", "noise"),
+    [("insert", 2, 0.3), ("suture", 0, 0.3), pytest.param("pull_through", 0, 0.3, marks=pytest.mark.slow)],
+)
 def test_needles_and_threads_that_enter_and_leave_holes_while_coasting_have_the_bits_of_those_that_do_not(
     task: str, seed: int, noise: float
 ) -> None:

@@ -173,9 +173,9 @@ def main(words: list[str]) -> int:
                 functions = walked(name, Path(folder))
             modules = stretches(functions)
             again = returns(modules)
-            report(
-                f"{name} at {revision}: {len(functions)} functions of {len(set(modules))} modules, {again.total()} returns"
-            )
+            rate = f"{100 * again.total() / len(functions):.0f} for 100 functions"
+            counts = f"{len(functions)} functions of {len(set(modules))} modules, {again.total()} returns, {rate}"
+            report(f"{name} at {revision}: {counts}")
             report("    " + ", ".join(f"{module} {count}" for module, count in again.most_common()))
             if given.all:
                 report("    " + " ".join(modules))

@@ -10,7 +10,7 @@ import pytest
 pytestmark = pytest.mark.timeout(900)
 
 
-LONG = ("test_changes.py", "test_ending.py")
+LONG = ("test_changes.py", "test_ending.py", "test_outside.py", "test_quality.py", "test_random_scenes.py")
 """What `test_in_module` runs in the newest Blender; `make test-slow` runs it in this one too."""
 
 

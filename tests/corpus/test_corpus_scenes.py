@@ -260,7 +260,7 @@ def test_joints_at_zero_agree_with_the_locations(corpus: Path, name: str, count:
 
 
 @pytest.mark.usefixtures("hulls")
-@pytest.mark.parametrize("strict", [False, True])
+@pytest.mark.parametrize("strict", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_no_file_makes_a_traceback(corpus: Path, strict: bool) -> None:
     from ligature.cli.check import findings
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
@@ -20,14 +20,18 @@ POSITIONAL = {
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
-def test_a_negative_number_is_refused_before_anything_begins(script: Path, tmp_path: Path) -> None:
-    options = NUMBER.findall(script.read_text())
-    for option in options:
-        command = [sys.executable, str(script), *POSITIONAL.get(script.name, []), f"{option}=-1"]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=100, check=False)
-        if "ModuleNotFoundError" in done.stderr:
-            pytest.skip(done.stderr.splitlines()[-1])
-        output = done.stdout + done.stderr
-        assert done.returncode == 2 and option.lstrip("-") in output.splitlines()[-1], f"{option}: {output[-600:]}"
-        assert "Traceback" not in output
+def test_a_negative_number_is_refused_before_anything_begins(
+    script: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(script.parent)
+    for option in NUMBER.findall(script.read_text()):
+        monkeypatch.setattr(sys, "argv", [str(script), *POSITIONAL.get(script.name, []), f"{option}=-1"])
+        with pytest.raises(SystemExit) as left:
+            try:
+                runpy.run_path(str(script), run_name="__main__")
+            except ModuleNotFoundError as error:
+                pytest.skip(str(error))
+        output = "".join(capsys.readouterr())
+        assert left.value.code == 2 and option.lstrip("-") in output.splitlines()[-1], f"{option}: {output[-600:]}"
     assert list(tmp_path.iterdir()) == []
