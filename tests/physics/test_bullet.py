@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
+from typing import IO, Any
 
 import ligature
 import numpy as np
@@ -59,6 +61,27 @@ def test_each_client_has_a_handle_of_its_own_and_none_once_it_is_gone() -> None:
     assert again[0] == gone[0], "PyBullet gives the number away again"
     assert again[1] and again[1] not in handles[2:]
     for client, _ in (clients[0], *clients[2:], again):
+        pybullet.disconnect(client)
+
+
+@pytest.mark.parametrize("unread", ["/proc/self/maps", "/proc/self/mem"])
+def test_what_could_not_be_read_once_is_read_for_the_next_client(unread: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a process that had no file left when it made its first simulation."""
+
+    def read(path: str, *rest: Any, **more: Any) -> IO[Any]:
+        if path == unread:
+            raise OSError(errno.EMFILE, "too many open files", path)
+        return open(path, *rest, **more)
+
+    for name in ("begin", "kind"):
+        monkeypatch.setattr(bullet._Clients, name, None)
+    with monkeypatch.context() as patch:
+        patch.setattr(bullet, "open", read, raising=False)
+        first = bullet.connect()
+        assert first[1] == 0 and not bullet._is_client(8)
+    second = bullet.connect()
+    assert second[1] and bullet._handle(first[0])
+    for client, _ in (first, second):
         pybullet.disconnect(client)
 
 

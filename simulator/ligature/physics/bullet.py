@@ -5,8 +5,8 @@ calls them does as much again: a third of a tick. Compiled code calls the functi
 the same order, so that Bullet gets the same numbers. Handles of Bullet are whole numbers here: addresses.
 
 PyBullet lists its clients at an address that it tells nobody. The first `connect` finds it: the word of PyBullet's
-memory that holds a client afterwards and was 0 before. Where it is not found, handles are 0, and the callers use
-PyBullet.
+memory that holds a client afterwards and was 0 before. Where it is not found, the handle is 0, the callers use
+PyBullet, and the next `connect` looks again.
 
 Bullet makes a box for every link, one without a shape too, and compares each with all others in every tick.
 `exclude_void` takes those that can never touch anything out of that; Bullet skips boxes without an owner.
@@ -21,7 +21,6 @@ import contextlib
 import ctypes
 import os
 from collections.abc import Iterator
-from functools import cache
 from typing import Any
 
 import llvmlite.binding
@@ -161,9 +160,18 @@ def connect() -> tuple[int, int]:
 
 
 class _Clients:
-    """Where PyBullet lists its clients: address of the first, 0 when it was not found, None before the search."""
+    """Where PyBullet lists its clients, and what is in each of them.
+
+    Attributes
+    ----------
+    begin
+        Address of the first in the list; None until it is found, 0 where handles are not to be used.
+    kind
+        The first word of every client: the address of its class's functions; None until it is known.
+    """
 
     begin: int | None = None
+    kind: int | None = None
 
 
 def _connect_watched() -> tuple[int, int]:
@@ -177,7 +185,8 @@ def _connect_watched() -> tuple[int, int]:
         for k in np.flatnonzero((words != old) & (old == 0))
         if _is_client(int(words[k]))
     ]
-    _Clients.begin = found[0] - 8 * client if len(found) == 1 else 0
+    if len(found) == 1:
+        _Clients.begin = found[0] - 8 * client
     return client, _handle(client)
 
 
@@ -339,7 +348,9 @@ def _segments() -> Iterator[Integers]:
 
 def _is_client(address: int) -> bool:
     """Whether there is an object of the client class at an address, which may be invalid."""
-    return address % 8 == 0 and address > 0 and _word(address) == _class_of_clients()
+    if _Clients.kind is None:
+        _Clients.kind = _class_of_clients()
+    return address % 8 == 0 and address > 0 and _Clients.kind is not None and _word(address) == _Clients.kind
 
 
 def _word(address: int) -> int | None:
@@ -352,9 +363,8 @@ def _word(address: int) -> int | None:
         return None
 
 
-@cache
 def _class_of_clients() -> int | None:
-    """What the first word of every client holds: the address of its class's functions."""
+    """The first word of a client that is made for that; None where memory cannot be read, as with no file left."""
     make, end = _library.b3ConnectPhysicsDirect, _library.b3DisconnectSharedMemory
     make.restype, end.argtypes = ctypes.c_void_p, [ctypes.c_void_p]
     example = make()
