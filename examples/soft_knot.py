@@ -144,7 +144,7 @@ class Theatre:
             self._watch()
 
     def wait(self, seconds: float) -> None:
-        """Let time pass."""
+        """Go on for so many seconds."""
         for _ in range(round(seconds / (CONTROL * self.simulation.dt))):
             self.simulation.step(CONTROL)
             self._watch()
