@@ -1,10 +1,10 @@
 #!/bin/sh
 # All tests, in two halves at once: sh .ci/unit_tests.sh PYTHON REAL_TIME_TESTS…
 #
-# The tests that watch real time mostly wait. What they leave of the processors goes to all others: two workers of lower
+# The tests that watch real time mostly wait. What they leave of the processors goes to all others: three workers of lower
 # priority, whose output comes when the tests that watch real time are done. What these fail for once, they may try again
 # when nothing runs beside them. Where Linux shares the processor among sessions first, those of the simulators under test
-# would count no more than the session of the two workers: that is a session of its own, of lower priority as a whole.
+# would count no more than the session of the three workers: that is a session of its own, of lower priority as a whole.
 set -u
 python=$1
 shift
@@ -17,7 +17,7 @@ log=build/logs/unit_tests.log
 # shellcheck disable=SC2086,SC2016
 setsid sh -c 'echo 5 2>/dev/null >/proc/self/autogroup; exec "$@"' sh \
     nice -n 19 env --default-signal=INT,QUIT \
-    "$python" -m pytest -m "not slow" -n 2 --dist worksteal tests $ignored >"$log" 2>&1 </dev/null &
+    "$python" -m pytest -m "not slow" -n 3 --dist worksteal tests $ignored >"$log" 2>&1 </dev/null &
 others=$!
 trap 'kill "$others" 2>/dev/null' EXIT
 trap 'exit 130' INT
