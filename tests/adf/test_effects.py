@@ -192,6 +192,7 @@ BESIDE: list[tuple[str, dict[str, Any]]] = [
     ("skybox", {"skybox": {"path": "./", "shaders": SHADERS, **{s: f"{s}.png" for s in ("right", "left", "top", "bottom", "front", "back")}}}),
     ("ligature transfer function", {"ligature transfer function": [{"value": 0.5, "opacity": 0.5}]}),
     ("attenuation", {"attenuation": {"constant": 1.0, "linear": 0.0, "quadratic": 0.0}}),
+    ("way", {"way": [{"x": 0.01, "y": 0.02, "z": 0.03}]}),
 ]  # fmt: skip
 """The same for all keys that begin so."""
 
