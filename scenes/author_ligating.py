@@ -53,7 +53,7 @@ strands, the product of both. A bend above 40 per metre stays."""
 
 
 def body(name: str, shapes: list[dict[str, Any]], *colour: float) -> dict[str, Any]:
-    """A body that stands still, its frame at the foot of the vessel."""
+    """A body that stands still, its frame at `PLACE`: the foot of the vessel."""
     keys = {"color components": small.colour(*colour)}
     return small.body(name, pose_matrix(PLACE, (0, 0, 0)), 0.0, shapes, **keys)
 
@@ -78,12 +78,12 @@ def posts() -> dict[str, Any]:
     return body("Posts", shapes, 0.6, 0.6, 0.6)
 
 
-def clip() -> dict[str, Any]:
-    """Two pairs of pins with the short end between them, and their column."""
+def clip(x: float = BESIDE) -> dict[str, Any]:
+    """Two pairs of pins with the short end between them, at ``x``, and their column."""
     low, aside = LEVEL + TOP - PINS, 0.5 * GAP + PIN
-    shapes = [column(BESIDE + side * aside, y, PIN, low, LEVEL + TOP) for y in CLIPPED for side in (-1, 1)]
+    shapes = [column(x + side * aside, y, PIN, low, LEVEL + TOP) for y in CLIPPED for side in (-1, 1)]
     width, depth = GAP + 4.0 * PIN, CLIPPED[1] - CLIPPED[0] + 2.0 * PIN
-    shapes.append(small.shape("BOX", (BESIDE, sum(CLIPPED) / 2, low / 2), x=width, y=depth, z=low))
+    shapes.append(small.shape("BOX", (x, sum(CLIPPED) / 2, low / 2), x=width, y=depth, z=low))
     return body("Clip", shapes, 0.7, 0.7, 0.75)
 
 

@@ -38,8 +38,8 @@ LEVEL = ligating.LEVEL
 BITE, DEEP = 0.0045, 0.0045
 """What the stitch takes of each lip, and how deep it passes the walls."""
 
-CLIPPED, SHORT, LONG = ligating.CLIPPED, 0.054, 0.085
-"""How far from the tissue the clip's pins are; lengths of both ends."""
+SHORT, LONG = 0.054, 0.085
+"""Lengths of both ends."""
 
 ASIDE, TURN = 0.7, 0.012
 """Angle by which the long end leads aside, and radius with which it turns there."""
@@ -67,33 +67,20 @@ def pad() -> dict[str, Any]:
     keys = {"color components": small.colour(0.85, 0.55, 0.5)}
     shapes = [small.shape("BOX", (0, 0, 0), x=PAD[0], y=PAD[1], z=PAD[2])]
     body = small.body("Pad", place, 0.0, shapes, **keys)
-    width, length, depth = WOUND
-    top = PAD[2] / 2
     body["ligature tissue"] = {
         "material": "silicone pad",
         "cell size": CELL,
         "fixed": ["-z"],
-        "slits": [
-            {
-                "from": small.vector((-width / 2, -length / 2, top - depth)),
-                "to": small.vector((width / 2, length / 2, top)),
-            }
-        ],
+        "slits": [small.slit(WOUND, PAD[2] / 2)],
     }
     return body
-
-
-def body(name: str, shapes: list[dict[str, Any]], *colour: float) -> dict[str, Any]:
-    """A body that stands still, its frame below the stitch."""
-    keys = {"color components": small.colour(*colour)}
-    return small.body(name, pose_matrix(PLACE, (0, 0, 0)), 0.0, shapes, **keys)
 
 
 def plate() -> dict[str, Any]:
     """What the tissue is glued to."""
     height = LEVEL + PAD[1] / 2
     shapes = [small.shape("BOX", (0, -PAD[2] - 0.0025, height / 2), x=PAD[0], y=0.004, z=height)]
-    return body("Plate", shapes, 0.6, 0.6, 0.6)
+    return ligating.body("Plate", shapes, 0.6, 0.6, 0.6)
 
 
 def rest() -> dict[str, Any]:
@@ -102,17 +89,7 @@ def rest() -> dict[str, Any]:
     at = points[-2] + RESTED * (points[-1] - points[-2]) / np.linalg.norm(points[-1] - points[-2])
     top = LEVEL - 0.5 * ligating.DIAMETER
     shapes = [small.shape("BOX", (at[0], at[1], top / 2), (0, 0, ASIDE), x=REST[0], y=REST[1], z=top)]
-    return body("Rest", shapes, 0.6, 0.6, 0.6)
-
-
-def clip() -> dict[str, Any]:
-    """Two pairs of pins with the short end between them, and their column."""
-    x, low = 0.5 * WOUND[0] + BITE, LEVEL + ligating.TOP - ligating.PINS
-    aside, radius = 0.5 * ligating.GAP + ligating.PIN, ligating.PIN
-    shapes = [ligating.column(x + s * aside, y, radius, low, LEVEL + ligating.TOP) for y in CLIPPED for s in (-1, 1)]
-    width, depth = ligating.GAP + 4.0 * radius, CLIPPED[1] - CLIPPED[0] + 2.0 * radius
-    shapes.append(small.shape("BOX", (x, sum(CLIPPED) / 2, low / 2), x=width, y=depth, z=low))
-    return body("Clip", shapes, 0.7, 0.7, 0.75)
+    return ligating.body("Rest", shapes, 0.6, 0.6, 0.6)
 
 
 def thread() -> dict[str, Any]:
@@ -137,7 +114,12 @@ def thread() -> dict[str, Any]:
 def task() -> dict[str, Any]:
     """Tissue, its plate, clip, rest, thread and endoscope."""
     found = theatre.document({"BODY CameraFrame": theatre.camera_frame()})
-    own = {"BODY Pad": pad(), "BODY Plate": plate(), "BODY Rest": rest(), "BODY Clip": clip()}
+    own = {
+        "BODY Pad": pad(),
+        "BODY Plate": plate(),
+        "BODY Rest": rest(),
+        "BODY Clip": ligating.clip(0.5 * WOUND[0] + BITE),
+    }
     return {
         **found, **own, "SUTURE Thread": thread(), "bodies": [*own, "BODY CameraFrame"], "sutures": ["SUTURE Thread"],
     }  # fmt: skip

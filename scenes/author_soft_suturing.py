@@ -62,19 +62,12 @@ def pad() -> dict[str, Any]:
     place = pose_matrix((x + ASIDE, y, z + BOARD_HIGH[2] + PAD[2] / 2), (0, 0, 0))
     body = small.body("Pad", place, 0.0, [small.shape("BOX", (0, 0, 0), x=PAD[0], y=PAD[1], z=PAD[2])])
     small.looks(body, f"{HERE.name}/high_res/pad.obj")
-    width, length, depth = WOUND
-    top = PAD[2] / 2
     body["ligature tissue"] = {
         "material": "silicone pad",
         **SHARP,
         "cell size": CELL,
         "fixed": ["-z"],
-        "slits": [
-            {
-                "from": small.vector((-width / 2, -length / 2, top - depth)),
-                "to": small.vector((width / 2, length / 2, top)),
-            }
-        ],
+        "slits": [small.slit(WOUND, PAD[2] / 2)],
     }
     return body
 

@@ -133,6 +133,15 @@ def body(name: str, T_world_body: Matrix, mass: float, shapes: list[dict[str, An
     return block
 
 
+def slit(size: tuple[float, float, float], top: float) -> dict[str, Any]:
+    """A wound of width, length and depth ``size``, across the middle of a side of tissue at the height ``top``."""
+    width, length, depth = size
+    return {
+        "from": vector((-width / 2, -length / 2, top - depth)),
+        "to": vector((width / 2, length / 2, top)),
+    }
+
+
 def looks(block: dict[str, Any], mesh: str) -> None:
     """Draw a body as a mesh of `author_instruments`; without shapes to collide with it touches nothing."""
     block.pop("compound shape", None)

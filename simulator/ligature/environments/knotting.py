@@ -27,9 +27,6 @@ Array = NDArray[np.float64]
 
 MIRRORED = np.array([-1.0, 1.0, 1.0])
 
-HELD_UP = np.array([-0.025, 0.040, 0.032])
-"""Where the left hand holds the long end for the hook, from the vessel."""
-
 BEHIND = np.array([-0.009, 0.009, 0.028]), np.array([-0.009, 0.009, 0.004])
 """Where the right tool comes down behind it, on the side of the vessel."""
 
@@ -68,8 +65,8 @@ SHORT, TAKEN = 0.036, np.array([0.6, -0.4, -0.7])
 OPPOSITE, GIVEN, YIELD = np.array([-0.028, 0.014, 0.005]), np.array([0.030, 0.0, 0.008]), 0.3
 """Where the left hand then brings the short end, to where the right one yields meanwhile, and from which newtons on."""
 
-APART, LOCK, SLOWEST = (np.array([0.075, -0.008, 0.005]), np.array([-0.060, 0.018, 0.005])), 2.0, 0.3
-"""Where the right and the left hand draw both ends, newtons with which they stop, and share of an action."""
+APART, SLOWEST = (np.array([0.075, -0.008, 0.005]), np.array([-0.060, 0.018, 0.005])), 0.3
+"""Where the right and the left hand draw both ends, and share of an action."""
 
 
 def knot_tie(hand: Hand, observation: Array) -> Iterator[Array]:
@@ -82,8 +79,11 @@ def knot_tie(hand: Hand, observation: Array) -> Iterator[Array]:
 class Knotter(Tier):
     """Both hands, and the thread."""
 
-    UP, LOCKED = HELD_UP, LOCK
-    """As `HELD_UP` and `LOCK`."""
+    UP = np.array([-0.025, 0.040, 0.032])
+    """Where the left hand holds the long end for the hook, from the vessel."""
+
+    LOCKED = 2.0
+    """Newtons with which both hands stop to draw the ends apart."""
 
     def knot(self) -> Iterator[Array]:
         """All of the knot, both of its ends drawn, each in a hand."""

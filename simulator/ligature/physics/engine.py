@@ -181,10 +181,10 @@ class Engine:
         motions.everything()
         far = arrays.far
         far[:] = 0.0
+        tree_of = {tree.uid: k for k, tree in enumerate(self.trees)}
         for uid, link, group, mask in self._colliders:
-            tree = next((k for k, tree in enumerate(self.trees) if tree.uid == uid), None)
-            if tree is not None and (group, mask) != VOID:
-                row = motions.row(tree, link)
+            if uid in tree_of and (group, mask) != VOID:
+                row = motions.row(tree_of[uid], link)
                 corners = np.array(pybullet.getAABB(uid, link, physicsClientId=self.client))
                 farthest = np.abs(corners - motions.pose[row, :3]).max(axis=0)
                 far[row] = max(far[row], float(np.linalg.norm(farthest)))
