@@ -7,7 +7,7 @@ leaves out the object, ``range`` where it takes a value that no scene can use.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 
 from ligature.adf.diagnostics import Diagnostic, Mark, Severity
 from ligature.adf.document import Element
@@ -189,8 +189,3 @@ def _unknown(name: str, prefix: str, mark: Mark, element: Element) -> Diagnostic
         return Diagnostic(Severity.WARNING, message, mark, "merge keys are not part of the format", "unknown")
     hint = suggestion(name, siblings) or "it has no effect"
     return Diagnostic(Severity.WARNING, message, mark, hint, "unknown")
-
-
-def errors(found: Iterable[Diagnostic]) -> bool:
-    """Whether one of the findings is an error."""
-    return any(d.severity >= Severity.ERROR for d in found)

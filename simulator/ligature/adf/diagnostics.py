@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,6 +49,11 @@ class Diagnostic:
         place = f"{self.mark}: " if self.mark else ""
         hint = f"; {self.hint}" if self.hint else ""
         return f"{place}{self.severity.name.lower()}: {self.message}{hint}"
+
+
+def any_error(found: Iterable[Diagnostic]) -> bool:
+    """Whether one of the findings is an error."""
+    return any(d.severity >= Severity.ERROR for d in found)
 
 
 class AdfError(Exception):

@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
-from ligature.adf.diagnostics import Diagnostic, Mark, Severity
-from ligature.adf.nodes import Mapping, Node, Sequence, plain
+from ligature.adf.diagnostics import Diagnostic, Mark, any_error
+from ligature.adf.nodes import Mapping, Node, Scalar, Sequence, plain
 from ligature.adf.schema import BY_PATH, LISTS, SCHEMA, Fault, Key, Status, Type
 from ligature.adf.values import BadValue, Vector, convert
 
@@ -145,17 +145,64 @@ class Element:
         return node
 
 
-def own_element(kind: str, root: Mapping) -> Element:
-    """The file's own keys as an element; ``kind`` is that of the file, ``root`` the whole file."""
+def own_element(kind: str, root: Mapping, key: str = "") -> Element:
+    """The file's own keys as an element called ``key``; ``kind`` is that of the file, ``root`` the whole file."""
     own = Mapping(root.mark, root.span, entries={n: e for n, e in root.entries.items() if n in BY_PATH[kind]})
     own.uses = root.uses
-    return Element(kind, kind, own)
+    return Element(kind, key or kind, own)
 
 
 def object_element(kind: str, key: str, root: Mapping) -> Element | None:
     """The object of a ``kind`` that the file defines under ``key``; None when it defines none."""
     node = root.get(key)
     return Element(kind, key, node) if isinstance(node, Mapping) else None
+
+
+@dataclass
+class ListedItem:
+    """An item of a list of objects.
+
+    Attributes
+    ----------
+    list_name, node
+        The list, and the item as it stands there.
+    name
+        The name that it is; None for an item that is no name.
+    element
+        The object of that name; None where the file does not define it as a block, or defines it with an error.
+    first
+        The first item of that name in the list, which may be this one.
+    found
+        What is wrong with the object.
+    """
+
+    list_name: str
+    node: Node
+    name: str | None = None
+    element: Element | None = None
+    first: ListedItem | None = None
+    found: list[Diagnostic] = field(default_factory=list)
+
+    @property
+    def kind(self) -> str:
+        """Kind of the objects of the list."""
+        return LISTS[self.list_name]
+
+
+def listed_items(kind: str, root: Mapping) -> list[ListedItem]:
+    """All items of the lists of objects of a file of ``kind``, list by list, with the objects that they name."""
+    items = []
+    for list_name in LISTS:
+        node = root.get(list_name) if list_name in BY_PATH[kind] else None
+        firsts: dict[str, ListedItem] = {}
+        for item_node in node.items if isinstance(node, Sequence) else []:
+            item = ListedItem(list_name, item_node)
+            if isinstance(item_node, Scalar) and not item_node.null:
+                item.name = item_node.text
+                item.first = firsts.setdefault(item.name, item)
+                item.element = object_element(item.kind, item.name, root)
+            items.append(item)
+    return items
 
 
 @cache
@@ -195,7 +242,7 @@ class Document:
     @property
     def ok(self) -> bool:
         """Whether no error was found."""
-        return all(d.severity < Severity.ERROR for d in self.diagnostics)
+        return not any_error(self.diagnostics)
 
     def elements(self, name: str) -> tuple[Element, ...]:
         """The usable listed objects of the list ``name``, in list order, repetitions kept."""

@@ -7,11 +7,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from ligature.model.frames import Array, inverse
+from ligature.mesh import box_inertia
+from ligature.model.frames import Array, frame, inverse
 from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Sphere, TriMesh
 
 HULL_MARGIN_OF_ESTIMATE = 0.04
 """Bullet's default margin in metres; AMBF estimates the inertia of hulls with it."""
+
+
+def estimated_moments(parts: tuple[Collider, ...], T_body_inertial: Array, margin: float, mass: float) -> Array:
+    """Principal moments (3,) of a body that gives none: of a box of the size of its shapes."""
+    size = estimate_size(parts, T_body_inertial, margin)
+    return np.zeros(3) if size is None else box_inertia(mass, size)
+
+
+def estimated_inertial(parts: tuple[Collider, ...]) -> Array:
+    """Inertial frame (4, 4) in B of a body that gives none: at the centroid of its collision mesh."""
+    centroid = mesh_centroid(parts)
+    return np.eye(4) if centroid is None else frame(np.eye(3), centroid)
 
 
 def estimate_size(parts: tuple[Collider, ...], T_body_inertial: Array, margin: float) -> Array | None:

@@ -66,7 +66,7 @@ def joint_of(
         equilibrium=equilibrium,
         six_dof=_six_dof(element, kind),
         cone_twist=_cone_twist(element, kind),
-        motor_enabled=_motor(element.raw_value("enable motor")),
+        motor_enabled=_motor(element.value("enable motor")),
         feedback=element.flag("enable feedback"),
         passive=element.flag("passive"),
     )

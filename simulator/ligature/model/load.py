@@ -75,12 +75,12 @@ def load(
     """
     if not isinstance(path, str | os.PathLike):
         raise TypeError(f"path is {path!r}; it must be the path of a file, or the name of a scene such as 'suturing'")
+    models, devices = indices("models", models), indices("devices", devices) or ()
     for what, given in (("files", files), ("roots", roots), ("soft", soft), ("arms", arms or ())):
         check_list(what, given)
     if not all(isinstance(arm, Mapping) for arm in arms or ()):
         raise TypeError(f"arms is {arms!r}; it must be a list of mappings, such as [{{'name': 'MTML', 'kind': 'mtm'}}]")
     start = launch_file(Path(path))
-    models, devices = indices("models", models), indices("devices", devices) or ()
     resolver = Resolver.for_file(start, [Path(root) for root in (*roots, *(Path(f).parent for f in files))])
     try:
         found = read_scene(start, resolver, models, files, arms, devices)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Container, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ligature.adf import Element
@@ -29,11 +29,11 @@ def free_suffix(base: str, taken: Container[str]) -> str:
     return next(s for s in itertools.chain(("",), map(str, itertools.count(1))) if base + s not in taken)
 
 
+@dataclass
 class Names:
-    """Hands out identities of one kind of object; repeated identifiers get the suffixes 1, 2 and so on."""
+    """Hands out identities of one kind of object; repeated ``identifiers`` get the suffixes 1, 2 and so on."""
 
-    def __init__(self) -> None:
-        self.identifiers: list[str] = []
+    identifiers: list[str] = field(default_factory=list)
 
     def identity(self, element: Element, namespace: str, model: int, passive: bool | None = None) -> Identity:
         """The identity of ``element`` in a file with ``namespace``; it is registered as taken."""

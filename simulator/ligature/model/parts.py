@@ -11,9 +11,8 @@ from functools import partial
 import numpy as np
 
 from ligature.adf import Diagnostic, Element, Severity
-from ligature.mesh import box_inertia
-from ligature.model.extents import estimate_size, mesh_centroid
-from ligature.model.frames import Array, frame, pose_matrix
+from ligature.model.extents import estimated_inertial, estimated_moments
+from ligature.model.frames import Array, pose_matrix
 from ligature.model.geometry import FileContext, colliders, collision_margin, visual
 from ligature.model.scene import (
     Body,
@@ -24,7 +23,7 @@ from ligature.model.scene import (
     Sensor,
     SensorType,
 )
-from ligature.model.shapes import Collider, ShaderFiles
+from ligature.model.shapes import ShaderFiles
 from ligature.model.tissue import check_density, inertial_of, tissue_of
 
 _INERTIAL_KEYS = ("inertia", "inertial offset", "gravity")
@@ -37,9 +36,9 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
     """
     offset = pose_matrix(*element.pose("inertial offset")) if element.has("inertial offset") else None
     shapes = colliders(element, context, np.eye(4) if offset is None else offset)
+    margin = collision_margin(element, shapes, context.report)
     looks = visual(element, context, shaders)
     tissue = tissue_of(element, context, looks, shapes)
-    margin = collision_margin(element, shapes, context.report)
     has_mass = element.has("mass")  # without it, no inertial key has an effect
     offset, moments = (offset, _moments(element)) if has_mass else (None, None)
     if tissue is not None:
@@ -53,8 +52,8 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
         if not has_mass:
             _warn_no_mass(element, context)
         mass = element.number("mass")
-        T_body_inertial = _estimated_offset(shapes) if offset is None else offset
-        inertia = _box_moments(shapes, T_body_inertial, margin, mass) if moments is None else moments
+        T_body_inertial = estimated_inertial(shapes) if offset is None else offset
+        inertia = estimated_moments(shapes, T_body_inertial, margin, mass) if moments is None else moments
     own_gravity = has_mass and element.has("gravity")
     return partial(
         Body,
@@ -84,18 +83,6 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
 def _moments(element: Element) -> Array | None:
     """Principal moments (3,) of a body that gives them."""
     return np.array([element.number(f"inertia.{k}") for k in ("ix", "iy", "iz")]) if element.has("inertia") else None
-
-
-def _box_moments(shapes: tuple[Collider, ...], T_body_inertial: Array, margin: float, mass: float) -> Array:
-    """Principal moments (3,) of a body that gives none: of a box of the size of its shapes."""
-    size = estimate_size(shapes, T_body_inertial, margin)
-    return np.zeros(3) if size is None else box_inertia(mass, size)
-
-
-def _estimated_offset(shapes: tuple[Collider, ...]) -> Array:
-    """Inertial frame (4, 4) in B of a body that gives none: at the centroid of its collision mesh."""
-    centroid = mesh_centroid(shapes)
-    return np.eye(4) if centroid is None else frame(np.eye(3), centroid)
 
 
 def _surface_friction(element: Element) -> float:

@@ -77,7 +77,7 @@ def plugin_entries(
     found: list[PluginEntry] = []
     findings: list[Diagnostic] = []
     for element, body in _owners(documents, bodies):
-        entries = element.raw_value("plugins")
+        entries = element.value("plugins")
         for item in entries if isinstance(entries, list) else []:
             if not isinstance(item, dict) or not {"name", "filename"} <= item.keys():
                 continue  # the checker reports it
