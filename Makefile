@@ -75,8 +75,9 @@ lint: $(STAMPS)/python-tests
 	.venv/bin/lint-imports
 
 # they watch real time, and mostly wait: all others run meanwhile, where they leave time
-OF_ROS_AT_ANY_TIME := $(foreach test,conversion launch_files messages names package,tests/ros/test_$(test).py)
-IN_REAL_TIME := $(filter-out $(OF_ROS_AT_ANY_TIME),$(wildcard tests/ros/test_*.py)) tests/cockpit \
+AT_ANY_TIME := $(foreach test,conversion launch_files messages names package,tests/ros/test_$(test).py) \
+  $(foreach test,address assist desk pictures pursuit tissue,tests/cockpit/test_$(test).py)
+IN_REAL_TIME := $(filter-out $(AT_ANY_TIME),$(wildcard tests/ros/test_*.py tests/cockpit/test_*.py)) \
   $(foreach test,ambf_simulator master physics recorder replay set_up supervisor,tests/cli/test_$(test).py)
 unit: developers blender-module
 	BLENDER_MODULES=build/bpy-$(NEWEST_BPY)/bin/python sh .ci/unit_tests.sh $(PYTHON) $(IN_REAL_TIME)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from typing import NamedTuple
 
 import gymnasium
 import ligature.environments
@@ -20,7 +21,7 @@ from tests.bench import ledger
 from tests.bench.reference import chain_step_us
 from tests.bench.resets import median_ms
 
-SECONDS = 10.0
+SECONDS, SPANS = 10.0, 5
 MAX_STEPS = 100
 
 
@@ -47,22 +48,44 @@ def rate(name: str, processes: int, seconds: float) -> float:
     return found
 
 
-def rate_alone(name: str, seconds: float) -> tuple[float, float, float]:
-    """Steps for each second of the wall, and of the processor, and milliseconds of it for a reset, in this process."""
+class Spans(NamedTuple):
+    """What one process does: medians over spans, each measured right after the reference."""
+
+    of_wall: float
+    """Steps for each second of the wall."""
+    of_processor: float
+    """Steps for each second of the processor."""
+    ratio: float
+    """Wall time of a step over that of the reference."""
+    ratio_of_processor: float
+    reset_ms: float
+    """Milliseconds of a reset."""
+    reset_ratio: float
+    """Wall time of a reset over that of a step of the reference."""
+
+
+def alone(name: str, seconds: float) -> Spans:
+    """Steps with random actions, resets included, in this process, over ``seconds`` in all."""
     env, rng = made(name), np.random.default_rng(0)
     env.reset(seed=0)
-    steps, begin, spent = 0, time.perf_counter(), time.process_time()
-    while time.perf_counter() - begin < seconds:
-        *_, done, cut, _ = env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32))
-        steps += 1
-        if done or cut:
-            env.reset()
-    wall, spent = time.perf_counter() - begin, time.process_time() - spent
+    found = []
+    for _ in range(SPANS):
+        references = chain_step_us(), chain_step_us(clock="process_time")
+        steps, begin, spent = 0, time.perf_counter(), time.process_time()
+        while time.perf_counter() - begin < seconds / SPANS:
+            *_, done, cut, _ = env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32))
+            steps += 1
+            if done or cut:
+                env.reset()
+        wall, spent = time.perf_counter() - begin, time.process_time() - spent
+        ratios = 1e6 * wall / steps / references[0], 1e6 * spent / steps / references[1]
+        found.append((steps / wall, steps / spent, *ratios))
     reset = median_ms(
         env.reset, lambda: [env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)) for _ in range(10)]
     )
     env.close()
-    return steps / wall, steps / spent, reset
+    of_wall, of_processor, ratio, ratio_of_processor = (float(median) for median in np.median(found, axis=0))
+    return Spans(of_wall, of_processor, ratio, ratio_of_processor, reset, 1e3 * reset / references[0])
 
 
 def main() -> int:
@@ -71,17 +94,17 @@ def main() -> int:
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
     load = os.getloadavg()[0]
     for name in sorted(name for name in gymnasium.registry if name.startswith("ligature/")):
-        reference = chain_step_us()
-        (one, spent, reset), two = rate_alone(name, seconds), rate(name, 2, seconds)
+        one, two = alone(name, seconds), rate(name, 2, seconds)
         found[name] = {
-            "steps_per_second": one, "real_time_factor": one * CONTROL, "real_time_factor_of_processor": spent * CONTROL,
-            "two_processes": two * CONTROL, "ratio": 1e6 / one / reference, "ratio_of_processor": 1e6 / spent / reference,
-            "reset": {"ms": reset, "ratio": 1e3 * reset / reference},
+            "steps_per_second": one.of_wall, "real_time_factor": one.of_wall * CONTROL,
+            "real_time_factor_of_processor": one.of_processor * CONTROL, "two_processes": two * CONTROL,
+            "ratio": one.ratio, "ratio_of_processor": one.ratio_of_processor, "reset": {"ms": one.reset_ms, "ratio": one.reset_ratio},
         }  # fmt: skip
         sys.stdout.write(
-            f"{name}: {one:.0f} steps/s in one process, {one * CONTROL:.2f} times real time, "
-            f"{spent * CONTROL:.2f} by processor time; {two:.0f} in two, {two * CONTROL:.2f} times; "
-            f"reset {reset:.1f} ms; a step is {1e6 / spent / reference:.1f} references\n"
+            f"{name}: {one.of_wall:.0f} steps/s in one process, {one.of_wall * CONTROL:.2f} times real time, "
+            f"{one.of_processor * CONTROL:.2f} by processor time; {two:.0f} in two, {two * CONTROL:.2f} times; "
+            f"reset {one.reset_ms:.1f} ms; a step is {one.ratio:.2f} references, {one.ratio_of_processor:.2f} by "
+            "processor time\n"
         )
         sys.stdout.flush()
     ledger.note("environments", found)

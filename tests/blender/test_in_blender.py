@@ -11,7 +11,7 @@ pytestmark = pytest.mark.timeout(900)
 
 
 LONG = ("test_changes.py", "test_ending.py", "test_outside.py", "test_quality.py", "test_random_scenes.py")
-"""What `test_in_module` runs in the newest Blender; `make test-slow` runs it in this one too."""
+"""What `make test` runs in the newest Blender alone (`test_in_module`); `make test-slow` runs it in this one too."""
 
 
 def test_the_add_on_holds_in_blender(blender: Callable[..., str]) -> None:

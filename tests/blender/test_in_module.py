@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.blender.test_in_blender import LONG
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 INSIDE = Path(__file__).resolve().parent / "inside"
 PYTHONS = os.environ.get("BLENDER_MODULES", "").split()
@@ -45,7 +47,21 @@ def python(request: pytest.FixtureRequest) -> str:
     return str(ROOT / request.param)
 
 
+HERE_TOO = ("test_operators.py", "test_from_empty.py")
+"""What also runs in the binary of Debian, and uses most of Blender's interface, of which versions differ."""
+
+
 def test_the_add_on_holds_in_the_blender_module(python: str, scripts: Path, corpus: Path) -> None:
+    run_inside(python, scripts, corpus, *LONG, *HERE_TOO)
+
+
+@pytest.mark.slow
+def test_the_rest_holds_in_the_blender_module_too(python: str, scripts: Path, corpus: Path) -> None:
+    run_inside(python, scripts, corpus, ".", *(f"--ignore={file}" for file in (*LONG, *HERE_TOO)))
+
+
+def run_inside(python: str, scripts: Path, corpus: Path, *files: str) -> None:
+    """Run tests of `inside`, files or options of pytest, in the Blender module of ``python``; they must pass."""
     environment = {
         **{name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
         "BLENDER_USER_SCRIPTS": str(scripts),
@@ -56,7 +72,7 @@ def test_the_add_on_holds_in_the_blender_module(python: str, scripts: Path, corp
         "PYTHONDONTWRITEBYTECODE": "1",
     }
     words = ["-q", "-ra", "-p", "no:cacheprovider", "-c", os.devnull, "--rootdir", str(INSIDE)]
-    command = [python, "-m", "pytest", *words, "--confcutdir", str(INSIDE), "."]
+    command = [python, "-m", "pytest", *words, "--confcutdir", str(INSIDE), *files]
     done = subprocess.run(
         command, env=environment, capture_output=True, text=True, timeout=880, check=False, cwd=INSIDE
     )

@@ -20,7 +20,7 @@ channels = st.floats(0.05, 0.8)
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("name", ["suturing_small", "suturing"])
+@pytest.mark.parametrize("name", [pytest.param("suturing_small", marks=pytest.mark.slow), "suturing"])
 def test_the_3d_view_is_as_bright_and_coloured_as_the_picture(person: Person, name: str) -> None:
     pair = compare(name, person)
     assert pair.difference < 0.1, pair.means
