@@ -36,6 +36,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PARTS = {
     "adf.values": "adf",
     "adf.scalars": "adf",
+    "adf.findings": "adf/test_findings.py,adf/test_reader.py,adf/test_rules.py",
     "adf.frames": "adf,model/test_frames.py",
     "adf.align": "adf/test_align.py",
     "adf.resolver": "adf/test_resolver.py",
