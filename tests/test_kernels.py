@@ -60,6 +60,45 @@ def test_all_files_that_kernels_read_decide_which_code_is_taken(source: Path) ->
     assert not missing, missing
 
 
+COLLECTED = """
+import gc, sys
+from pathlib import Path
+from numba.core import event
+from ligature import kernels
+seen = []
+class Watch(event.Listener):
+    def on_start(self, event):
+        seen.append(gc.get_threshold())
+    def on_end(self, event):
+        seen.append(gc.get_threshold())
+event.register("numba:compile", Watch())
+@kernels.compiled
+def twice(x):
+    return 2 * x
+@kernels.compiled
+def bad(x):
+    return x.nothing
+gc.set_threshold({first}, 7, 9)
+twice(21)
+try:
+    bad(1)
+except Exception:
+    pass
+print(seen[0] == ({during}, 7, 9), gc.get_threshold() == ({first}, 7, 9))
+"""
+
+
+@pytest.mark.parametrize(("usual", "during"), [(500, 20_000), (50_000, 50_000), (0, 0)])
+def test_unreachable_objects_are_looked_for_less_often_while_numba_compiles(
+    tmp_path: Path, usual: int, during: int
+) -> None:
+    """And as often as before afterwards, whether the compilation succeeded or not."""
+    program = tmp_path / "collected.py"
+    program.write_text(COLLECTED.format(first=usual, during=during))
+    done = run(f"import runpy; runpy.run_path({str(program)!r})", LIGATURE_CACHE=str(tmp_path / "cache"))
+    assert done.stdout == "True True\n", done.stdout + done.stderr
+
+
 LINKED = """
 from ligature import kernels
 @kernels.kernel
