@@ -74,11 +74,15 @@ def compile_with(function: Function, **options: Any) -> Function:
     return dispatcher
 
 
-class _Progress(event.Listener):
-    """Logs a line every few seconds while Numba compiles."""
+class _Compilation(event.Listener):
+    """Logs a line every few seconds while Numba compiles, and has Python look for unreachable objects less often then.
+
+    Numba makes millions of objects that live long; to look through them took a tenth of its time.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        self._usual = gc.get_threshold()
         self._depth = self._kernels = 0
         self._seconds = self._since = 0.0
         self._watched = False
@@ -87,6 +91,9 @@ class _Progress(event.Listener):
         with self._lock:
             if not self._depth:
                 self._since = time.monotonic()
+                self._usual = gc.get_threshold()
+                if 0 < self._usual[0] < RARELY:
+                    gc.set_threshold(RARELY, *self._usual[1:])
             self._depth += 1
             if not self._watched:
                 self._watched = True
@@ -98,6 +105,7 @@ class _Progress(event.Listener):
             self._depth -= 1
             if not self._depth:
                 self._seconds += time.monotonic() - self._since
+                gc.set_threshold(*self._usual)
 
     def _watch(self) -> None:
         """Report until a whole period passes without compilation."""
@@ -114,31 +122,4 @@ class _Progress(event.Listener):
             _log.warning("compiling for this machine, once: %d kernels after %.0f s", before, seconds)
 
 
-class _RareCollection(event.Listener):
-    """Lets Python look for unreachable objects less often while Numba compiles.
-
-    Numba makes millions that live long; to look through them took a tenth of its time.
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._depth = 0
-        self._usual = gc.get_threshold()
-
-    def on_start(self, event: Any) -> None:
-        with self._lock:
-            if not self._depth:
-                self._usual = gc.get_threshold()
-                if 0 < self._usual[0] < RARELY:
-                    gc.set_threshold(RARELY, *self._usual[1:])
-            self._depth += 1
-
-    def on_end(self, event: Any) -> None:
-        with self._lock:
-            self._depth -= 1
-            if not self._depth:
-                gc.set_threshold(*self._usual)
-
-
-event.register("numba:compile", _Progress())
-event.register("numba:compile", _RareCollection())
+event.register("numba:compile", _Compilation())

@@ -39,10 +39,12 @@ def findings_of(own: Element, items: list[ListedItem], root: Mapping, strict: bo
     list ends where a file has too many findings.
     ``strict`` rejects what AMBF rejects.
     """
-    others = _other_keys(root, own.kind)
+    listed = {item.node.text for item in items if isinstance(item.node, Scalar)}
+    unlisted = [name for name in root.entries if name not in BY_PATH[own.kind] and name not in listed]
+    others = [_other_key(name, *root.entries[name], own.kind) for name in unlisted[: MAX_FINDINGS + 1]]
     top, found = _sound(own, root)
     count = len(found) + len(others)
-    _extend(items, count, lambda item: _key_findings(item, root, own.kind, strict))
+    _extend(items, count, lambda item: _key_findings(item, root, unlisted, strict))
     _extend(items, count, _rule_findings)
     found += rule_findings(top)
     return top, [*found, *others, *(finding for item in items for finding in item.found)]
@@ -72,38 +74,20 @@ def _sound(own: Element, root: Mapping) -> tuple[Element, list[Diagnostic]]:
     found = [*repeated_keys(root), *missing_keys(own)]
     sound = {}
     for name, entry in own.node.entries.items():
-        listing = isinstance(entry[1], Sequence) and (name in LISTS or name == MODELS)
-        of_key = [] if listing else key_problems(own, name)
-        if name == MODELS and isinstance(entry[1], Sequence):
-            unnamed = [item for item in entry[1].items if not isinstance(item, Scalar) or item.null]
-            of_key = [no_path(item) for item in unnamed[:MAX_FINDINGS]]
+        node, of_key = entry[1], list[Diagnostic]()
+        if not isinstance(node, Sequence) or name not in (*LISTS, MODELS):
+            of_key = key_problems(own, name)
+        elif name == MODELS:  # items of other lists are judged with the objects that they name
+            unnamed = [item for item in node.items if not isinstance(item, Scalar) or item.null]
+            found += [no_path(item) for item in unnamed[:MAX_FINDINGS]]
         found += of_key
-        if listing or not any_error(of_key):
+        if not any_error(of_key):
             sound[name] = entry
     return Element(own.kind, own.key, replace(own.node, entries=sound)), found
 
 
-def _listed(root: Mapping, kind: str) -> set[str]:
-    names: set[str] = set()
-    for list_name in LISTS:
-        node = root.get(list_name)
-        if list_name in BY_PATH[kind] and isinstance(node, Sequence):
-            names |= {item.text for item in node.items if isinstance(item, Scalar)}
-    return names
-
-
-def _other_keys(root: Mapping, kind: str) -> list[Diagnostic]:
-    """Findings about top-level keys that are neither the file's own nor listed objects, such as typing errors."""
-    listed = _listed(root, kind)
-    found: list[Diagnostic] = []
-    for name, (key, node) in root.entries.items():
-        if name in BY_PATH[kind] or name in listed or len(found) > MAX_FINDINGS:
-            continue
-        found.append(_other_key(name, key, node, kind))
-    return found
-
-
 def _other_key(name: str, key: Scalar, node: Node, kind: str) -> Diagnostic:
+    """The finding about a top-level key that is neither the file's own nor a listed object, such as a typing error."""
     meant = suggestion(name, [key.name for key in SCHEMA[kind] if _may_hold(key, node)])
     if _holds_anchor(node):
         return Diagnostic(Severity.DEBUG, f"'{name}' only holds values for aliases", key.mark, "", "unlisted")
@@ -144,7 +128,7 @@ def _extend(items: list[ListedItem], count: int, findings: Callable[[ListedItem]
             item.element = None
 
 
-def _key_findings(item: ListedItem, root: Mapping, kind: str, strict: bool) -> list[Diagnostic]:
+def _key_findings(item: ListedItem, root: Mapping, unlisted: list[str], strict: bool) -> list[Diagnostic]:
     """What is wrong with the keys of an object, taken one by one; what is listed twice is checked once."""
     if item.name is None:
         return [_no_text(item.list_name, item.node, "the name of an object")]
@@ -152,7 +136,7 @@ def _key_findings(item: ListedItem, root: Mapping, kind: str, strict: bool) -> l
         message = f"'{item.name}' is listed twice in '{item.list_name}', so it exists twice"
         return [Diagnostic(Severity.INFO, message, item.node.mark, "", "repeated")]
     if item.element is None:
-        return [_undefined(item, item.name, root, kind)]
+        return [_undefined(item, item.name, root.get(item.name), unlisted)]
     found = problems(item.element)
     if item.kind != "joint":
         return found
@@ -170,16 +154,14 @@ def _rule_findings(item: ListedItem) -> list[Diagnostic]:
     return found
 
 
-def _undefined(item: ListedItem, name: str, root: Mapping, kind: str) -> Diagnostic:
+def _undefined(item: ListedItem, name: str, node: Node | None, unlisted: list[str]) -> Diagnostic:
     """AMBF makes a default body, camera or light, and refuses the file for a joint."""
-    node = root.get(name)
     defaulted = item.kind in _DEFAULTED or (isinstance(node, Scalar) and node.null)
     severity = Severity.WARNING if defaulted else Severity.ERROR
     if node is not None:
         message, hint = f"{item.kind} '{name}' is listed, but its definition is not a block of keys", "it is left out"
         return Diagnostic(severity, message, node.mark, hint, "undefined")
-    others = {other for other in root.entries if other not in BY_PATH[kind]}
-    hint = suggestion(name, others - _listed(root, kind)) or "define it or take it from the list"
+    hint = suggestion(name, unlisted) or "define it or take it from the list"
     message = f"{item.kind} '{name}' is listed but not defined"
     return Diagnostic(severity, message, item.node.mark, hint, "missing" if item.kind == "joint" else "undefined")
 
