@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import types
+from pathlib import Path
 from typing import Any
 
 import ligature
@@ -33,6 +34,7 @@ napoleon_attr_annotations = False
 
 html_theme = "furo"
 html_title = f"Ligature {release}"
+html_favicon = str(Path(__file__).with_name("favicon.svg"))
 html_static_path: list[str] = []
 html_copy_source = False
 html_show_sphinx = False

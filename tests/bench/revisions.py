@@ -1,10 +1,11 @@
-"""What one change cost: two revisions run the same work in turns, each in a process and with kernels of its own.
+"""What one change cost: two revisions do the same work in turns, span by span, each with kernels of its own.
 
-    python -m tests.bench.revisions BEFORE [AFTER] [--rounds 7]
+    python -m tests.bench.revisions BEFORE [AFTER] [--rounds 3]
 
 A revision is what git knows by that name; ``.`` is the working tree. The work is the bundled scene with its thread,
-whose needle follows commanded poses, and one throw of the demonstration. Printed are whether every body ended on the same bits,
-and the median ratio of the processor's times, first against second of each pair.
+whose needle follows commanded poses, and one throw of the demonstration. Each revision has a process, and only one of
+them runs at a time: for a span of some milliseconds, in which the machine is the same for both. Printed are whether
+every body ended on the same bits, and the median ratio of the processor's times of two spans.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tests.bench.walks import unpack
 
@@ -28,7 +30,11 @@ HERE = Path(__file__).resolve()
 PROJECT = HERE.parents[2]
 SCENE = "scenes/suturing_small/launch.yaml"
 TICKS, TICKS_PER_STEP = 6000, 20
-ROUNDS = 7
+STEPS_PER_SPAN = 100
+ROUNDS = 3
+
+Turn = Callable[[], None]
+"""Ends a span of work, and waits until the next may begin."""
 
 
 def poses(simulation: Any) -> bytes:
@@ -36,73 +42,135 @@ def poses(simulation: Any) -> bytes:
     return b"".join(simulation.bodies[name].pose.tobytes() for name in simulation.bodies)
 
 
-def scene(root: Path) -> dict[str, Any]:
-    """Command poses of the bundled scene's needle for six simulated seconds."""
+def scene(root: Path, turn: Turn) -> str:
+    """Command poses of the bundled scene's needle for six simulated seconds; returns the digest of where it ends."""
     import ligature
 
     simulation = ligature.Simulation(ligature.load(root / SCENE), update=5e-3)
     needle = simulation.bodies["BODY Needle"]
-    start, digest = needle.pose.copy(), hashlib.sha256()
+    start = needle.pose.copy()
     simulation.step(200)  # what is compiled or built at first is not counted
-    begin = time.process_time()
     for k in range(TICKS // TICKS_PER_STEP):
         goal = start.copy()
         goal[:3] += 0.02 * k / (TICKS // TICKS_PER_STEP), 0.0, 0.01 * (k % 50) / 50
+        turn()
         needle.command_pose(goal.tolist())
         simulation.step(TICKS_PER_STEP)
-    seconds = time.process_time() - begin
-    digest.update(poses(simulation))
-    return {"seconds": seconds, "hash": digest.hexdigest()}
+    turn()
+    return hashlib.sha256(poses(simulation)).hexdigest()
 
 
-def demonstration(root: Path) -> dict[str, Any]:
-    """One throw by the example of the revision; its simulation is read after every hundredth step."""
+def demonstration(root: Path, turn: Turn) -> str:
+    """One throw by the example of the revision; returns the digest of poses after every hundredth step."""
     from ligature.simulation import Simulation
 
     digest, calls, step = hashlib.sha256(), 0, Simulation.step
 
     def watched(simulation: Any, ticks: int = 1) -> None:
         nonlocal calls
+        if calls % STEPS_PER_SPAN == 0:
+            turn()
         step(simulation, ticks)
         calls += 1
-        if calls % 100 == 0:
+        if calls % STEPS_PER_SPAN == 0:
             digest.update(poses(simulation))
 
     Simulation.step = watched
     sys.argv = ["suture.py", "--throws", "1", "--seed", "0", "--out", tempfile.mkdtemp()]
     sys.path.insert(0, str(root / "examples"))
-    begin = time.process_time()
     try:
         runpy.run_path(str(root / "examples" / "suture.py"), run_name="__main__")
     except SystemExit as end:
         if end.code:
             raise
-    return {"seconds": time.process_time() - begin, "hash": digest.hexdigest()}
+    turn()
+    return digest.hexdigest()
 
 
 WORK = {"scene": scene, "demonstration": demonstration}
 
 
-def run(name: str, root: Path) -> dict[str, Any]:
-    """Do one work at a revision, in a process of its own."""
-    environment = {**os.environ, "PYTHONPATH": f"{root / 'simulator'}:{PROJECT}"}
-    words = [sys.executable, str(HERE), "--child", name, str(root)]
-    done = subprocess.run(words, cwd=root, env=environment, check=True, stdout=subprocess.PIPE, text=True)
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return found
+def work_in_turns(name: str, root: Path) -> None:
+    """Do one work, a span for each line of the input; answer each with its seconds, and the last with the digest."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # what the work prints is no answer
+    begin = None
+
+    def turn() -> None:
+        nonlocal begin
+        if begin is not None:
+            answer(time.process_time() - begin)
+        sys.stdin.readline()
+        begin = time.process_time()
+
+    def answer(what: float | str) -> None:
+        answers.write(json.dumps(what) + "\n")
+        answers.flush()
+
+    answer(WORK[name](root, turn))
+
+
+class Worker:
+    """A process that does one work at a revision, span by span."""
+
+    def __init__(self, name: str, root: Path) -> None:
+        environment = {**os.environ, "PYTHONPATH": f"{root / 'simulator'}:{PROJECT}"}
+        words = [sys.executable, str(HERE), "--child", name, str(root)]
+        self._process = subprocess.Popen(
+            words, cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def span(self) -> float | str:
+        """Do the next span; returns its seconds, or the digest when the work is done."""
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+        answered = self._process.stdout.readline()
+        if not answered:
+            raise RuntimeError(f"{' '.join(map(str, self._process.args))} ended with status {self._process.wait()}")
+        found: float | str = json.loads(answered)
+        return found
+
+    def end(self) -> None:
+        """Wait for the process."""
+        self._process.communicate()
+
+
+class Round(NamedTuple):
+    """The work done once by two revisions."""
+
+    seconds: list[tuple[float, float]]
+    """Of each span, by the processor."""
+    digests: tuple[str, str]
+
+
+def run(name: str, before: Path, after: Path) -> Round:
+    """Do one work at two revisions, in turns."""
+    workers = Worker(name, before), Worker(name, after)
+    seconds: list[tuple[float, float]] = []
+    while True:
+        order = (0, 1) if len(seconds) % 2 else (1, 0)
+        spans = {k: workers[k].span() for k in order}
+        if isinstance(spans[0], str) or isinstance(spans[1], str):
+            break
+        seconds.append((spans[0], spans[1]))
+    for k, worker in enumerate(workers):
+        while not isinstance(spans[k], str):  # other bits take another time
+            spans[k] = worker.span()
+        worker.end()
+    return Round(seconds, (str(spans[0]), str(spans[1])))
 
 
 def compare(name: str, before: Path, after: Path, rounds: int) -> None:
     """Print what one work says of both."""
-    for root in (before, after):
-        run(name, root)  # compiles
-    pairs = [(run(name, before), run(name, after)) for _ in range(rounds)]
-    ratios = sorted(second["seconds"] / first["seconds"] for first, second in pairs)
-    hashes = {first["hash"] for first, _ in pairs}, {second["hash"] for _, second in pairs}
-    same = "the same bits" if hashes[0] == hashes[1] and len(hashes[0]) == 1 else "OTHER BITS"
+    run(name, before, after)  # compiles
+    done = [run(name, before, after) for _ in range(rounds)]
+    ratios = [second / first for one in done for first, second in one.seconds]
+    low, median, high = statistics.quantiles(ratios)
+    same = "the same bits" if len({digest for one in done for digest in one.digests}) == 1 else "OTHER BITS"
     sys.stdout.write(
-        f"{name}: {same}; time after/before {statistics.median(ratios):.3f} ({ratios[0]:.3f} to {ratios[-1]:.3f} "
-        f"in {rounds} pairs)\n"
+        f"{name}: {same}; time after/before {median:.3f} (median of {len(ratios)} pairs of spans, of which the middle "
+        f"half {low:.3f} to {high:.3f})\n"
     )
     sys.stdout.flush()
 
@@ -116,7 +184,7 @@ def main() -> int:
     parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if asked.child:
-        sys.stdout.write("\n" + json.dumps(WORK[asked.child[0]](Path(asked.child[1]))) + "\n")
+        work_in_turns(asked.child[0], Path(asked.child[1]))
         return 0
     before, after = [*asked.revisions, "."][:2]
     with tempfile.TemporaryDirectory() as folder:
