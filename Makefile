@@ -33,7 +33,7 @@ developers: setup $(STAMPS)/debian-tests $(STAMPS)/python-tests
 
 $(STAMPS)/debian: debian-packages.txt
 	@mkdir -p $(STAMPS)
-	@echo "The first start sets everything up, in 4 to 12 minutes: Debian packages, Python packages, ROS messages, compilation."
+	@echo "The first start sets everything up, in 3 to 10 minutes: Debian packages, Python packages, ROS messages, compilation."
 	@sh .ci/install_debian_packages.sh debian-packages.txt
 	@touch $@
 
@@ -56,7 +56,7 @@ $(STAMPS)/package: setup.py pyproject.toml $(STAMPS)/messages
 
 # the kernels compile once, here rather than at the first start
 $(STAMPS)/compiled: $(STAMPS)/package
-	@$(STEP) "compiling the simulator's kernels for this machine, 2 to 4 minutes" .venv/bin/ligature compile
+	@$(STEP) "compiling the simulator's kernels for this machine, 1 to 3 minutes" .venv/bin/ligature compile
 	@touch $@
 
 # the simulator runs without these; what apt does not offer is named, and its tests are skipped

@@ -98,8 +98,8 @@ def progress(words):
         frame, frames = map(int, done[-1])
         return f"Simulating: frame {frame} of {frames}", frame / frames
     if "compiling" in words:
-        return "Compiling the simulator for this machine: 2 to 4 minutes, once", None
-    return "Starting the simulator; after an installation it compiles first, for 2 to 4 minutes", None
+        return "Compiling the simulator for this machine: 1 to 3 minutes, once", None
+    return "Starting the simulator; after an installation it compiles first, for 1 to 3 minutes", None
 
 
 def play(scene, identifiers, poses):

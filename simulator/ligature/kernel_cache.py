@@ -36,8 +36,9 @@ _KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic|unrolle
 _IMPORT = re.compile(rb"^from (ligature[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 _DIGESTED = re.compile(r"[0-9a-f]{16}")
 _CONSTANTS = (
-    "kernels.py", "kernel_cache.py", "unrolled.py", "grasping/fingers.py", "model/state.py", "physics/loop_arrays.py",
-    "suture/colliders.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py", "tissue/contact_arrays.py",
+    "kernels.py", "kernel_cache.py", "kernel_parts.py", "unrolled.py", "grasping/fingers.py", "model/state.py",
+    "physics/loop_arrays.py", "suture/colliders.py", "suture/layout.py", "suture/passages.py", "tissue/layout.py",
+    "tissue/contact_arrays.py",
 )  # fmt: skip
 """Sources without kernels whose contents are compiled into kernels."""
 
@@ -142,21 +143,21 @@ class _Place(caching._CacheLocator):
         return None if folder is None else cls(folder, function.__code__.co_firstlineno)
 
 
-class _Code(caching.CompileResultCacheImpl):
+class Code(caching.CompileResultCacheImpl):
+    """How the machine code of a kernel is kept."""
+
     _locator_classes = (_Place,)
 
-    def rebuild(self, target_context: Any, payload: Any) -> Any:
-        """Load a kernel; its library, which others link with, stays bitcode: parsed, it is eight times as large.
+    def reduce(self, data: Any) -> Any:
+        """What is kept: machine code, and of the LLVM code that Numba reads beside it the names of functions.
 
-        Where all kernels are loaded nothing links, and a physics process saves 20 MB.
+        What contains a kernel links with another form of it; see `ligature.kernel_parts`. To read all of it took
+        an eighth of a start.
         """
-        result = super().rebuild(target_context, payload)
-        library, (_, kind, parts) = result.library, payload[0]
-        if kind == "object":
-            library._shared_module.close()
-            library._shared_module = None
-            library._get_module_for_linking = lambda: llvmlite.binding.parse_bitcode(parts[1])
-        return result
+        (name, kind, (machine_code, _)), *others = super().reduce(data)
+        names = (function.name for function in data.library.get_defined_functions())
+        code = "\n".join(f'define void @"{name}"() {{ ret void }}' for name in names)
+        return (name, kind, (machine_code, llvmlite.binding.parse_assembly(code).as_bitcode())), *others
 
 
 class KernelCache(caching.FunctionCache):
@@ -166,7 +167,7 @@ class KernelCache(caching.FunctionCache):
     that they cannot wait for each other.
     """
 
-    _impl_class = _Code
+    _impl_class = Code
     _turn: int | None = None
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -241,8 +242,8 @@ def _warn_of_writes(reason: str) -> None:
     _log.warning("kernels cannot be kept and will be compiled again at the next start: %s", reason)
 
 
-def keep(dispatcher: Any) -> None:
+def keep(dispatcher: Any, kind: type[KernelCache] = KernelCache) -> None:
     """Keep the code of a kernel, where its source is a file and something can be written."""
     file = Path(inspect.getfile(dispatcher.py_func))
     if file.exists() and kernel_folder(file.resolve(), dispatcher.py_func.__module__) is not None:
-        dispatcher._cache = KernelCache(dispatcher.py_func)
+        dispatcher._cache = kind(dispatcher.py_func)

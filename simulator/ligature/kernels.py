@@ -19,6 +19,7 @@ import numba.np.linalg
 from numba.core import event
 
 from ligature.kernel_cache import keep
+from ligature.kernel_parts import Kernel
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -69,9 +70,11 @@ def inlined(function: Function) -> Function:
 
 def compile_with(function: Function, **options: Any) -> Function:
     """Like `compiled`, with options of `numba.njit`."""
-    dispatcher = numba.njit(**options)(function)
+    if numba.config.DISABLE_JIT:
+        return function
+    dispatcher: Any = Kernel(function, {}, {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, **options})
     keep(dispatcher)
-    return dispatcher
+    return dispatcher  # type: ignore[no-any-return]
 
 
 class _Compilation(event.Listener):

@@ -52,7 +52,7 @@ def compile_ahead(scenes: Sequence[Path], console: Console) -> int:
     begin = time.monotonic()
     console.print(
         f"compiling the kernels of {counted(sum(map(len, groups)), 'scene')} in "
-        f"{counted(len(groups), 'process', 'processes')}; this takes 2 to 4 minutes, once",
+        f"{counted(len(groups), 'process', 'processes')}; this takes 1 to 3 minutes, once",
         markup=False,
     )
     running = {group: _start(group, console) for group in groups}
@@ -95,8 +95,11 @@ def run_for_a_moment(launch: Path) -> None:
     for name in simulation.arms:
         simulation.arms[name].home()
     simulation.step(TICKS)
-    for kinematics in (Psm("LARGE_NEEDLE_DRIVER:400006"), Ecm(), Mtm("left")):
+    psm = Psm("LARGE_NEEDLE_DRIVER:400006")
+    for kinematics in (psm, Ecm(), Mtm("left")):
         _solve(kinematics)
+    joints = np.zeros(psm.n)
+    psm.solve(psm.frames(joints)[-1], joints, joints)
     for needle in simulation.scene.needles[:1]:
         for throw in islice(throws(simulation.scene, simulation.state[0], needle.arc.radius, COARSE), 1):
             _pierce(simulation, needle, throw)
@@ -108,7 +111,8 @@ def run_for_a_moment(launch: Path) -> None:
 def _solve(kinematics: Kinematics) -> None:
     """Solve forward and inverse kinematics and the Jacobians of an arm."""
     middle = 0.5 * (kinematics.lower + kinematics.upper)
-    kinematics.inverse(kinematics.forward(middle), middle)
+    pose = kinematics.forward(middle)
+    kinematics.inverse(pose), kinematics.inverse(pose, middle)
     kinematics.jacobian_body(middle), kinematics.jacobian_spatial(middle)
 
 

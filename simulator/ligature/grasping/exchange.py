@@ -11,9 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.grasping.fingers import EFFORT, LEAST_LEVER, STIFFNESS
-from ligature.grasping.friction import grasp_arrays, motions, open_motions, predict_free, scratch, solve
+from ligature.grasping.friction import (
+    friction_limits,
+    grasp_arrays,
+    motions,
+    open_motions,
+    predict_free,
+    scratch,
+    solve,
+)
 from ligature.kernels import inlined, kernel
-from ligature.physics.axes import Axes, asked_of, axes, open_axes, stop_at
+from ligature.physics.axes import Axes, asked_of, axes, open_axes, requested_effort, stop, stop_at
 from ligature.physics.trees import Places, Trees, bring_up, load, open_places, open_trees, trees
 from ligature.tables import opener, table_of
 
@@ -202,3 +210,6 @@ def warm_up() -> None:
     tables = table_of(moves), table_of(held), table_of(room)
     exchanged = Exchanged(*tables, one[:2], one, zero, np.zeros(1, np.bool_))
     exchange(0, here, place, np.zeros((1, 6)), np.zeros(1, np.bool_), table_of(exchanged), 1e-3)
+    friction_limits(1.0, 1.0, 1.0)
+    requested_effort(here, table_of(laws), 0, 1.0)
+    stop(here, table_of(laws), 0, 0.0, 0.0)

@@ -16,9 +16,9 @@ from .scene import body, model, select
 
 
 def test_words_of_the_simulator_become_progress():
-    assert progress("") == ("Starting the simulator; after an installation it compiles first, for 2 to 4 minutes", None)
+    assert progress("") == ("Starting the simulator; after an installation it compiles first, for 1 to 3 minutes", None)
     line = "compiling for this machine, once: 12 kernels after 4 s\n"
-    assert progress(line) == ("Compiling the simulator for this machine: 2 to 4 minutes, once", None)
+    assert progress(line) == ("Compiling the simulator for this machine: 1 to 3 minutes, once", None)
     assert progress(line + "3 of 12 frames\n6 of 12 frames\n") == ("Simulating: frame 6 of 12", 0.5)
 
 
