@@ -242,8 +242,9 @@ def _warn_of_writes(reason: str) -> None:
     _log.warning("kernels cannot be kept and will be compiled again at the next start: %s", reason)
 
 
-def keep(dispatcher: Any, kind: type[KernelCache] = KernelCache) -> None:
-    """Keep the code of a kernel, where its source is a file and something can be written."""
-    file = Path(inspect.getfile(dispatcher.py_func))
-    if file.exists() and kernel_folder(file.resolve(), dispatcher.py_func.__module__) is not None:
-        dispatcher._cache = kind(dispatcher.py_func)
+def cache_of(function: Any, kind: type[KernelCache] = KernelCache) -> Any:
+    """What keeps the code of a kernel: nothing does where its source is no file or nothing can be written."""
+    file = Path(inspect.getfile(function))
+    if file.exists() and kernel_folder(file.resolve(), function.__module__) is not None:
+        return kind(function)
+    return caching.NullCache()

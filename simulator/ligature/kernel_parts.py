@@ -18,7 +18,7 @@ from numba.core.compiler import Compiler, compile_result
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 
-from ligature.kernel_cache import Code, KernelCache, keep
+from ligature.kernel_cache import Code, KernelCache, cache_of
 
 
 class _Library(JITCodeLibrary):
@@ -101,24 +101,44 @@ class _PartCache(KernelCache):
     _impl_class = _Code
 
 
-class _Part(CPUDispatcher):  # type: ignore[misc]
+class _Kept(CPUDispatcher):  # type: ignore[misc]
+    """A function whose code is kept on disk. Most are never asked for it: they look for the place when they are."""
+
+    _kind: type[KernelCache]
+    _found: Any
+
+    @property
+    def _cache(self) -> Any:
+        if self._found is None:
+            self._found = cache_of(self.py_func, self._kind)
+        return self._found
+
+    @_cache.setter
+    def _cache(self, none: Any) -> None:
+        """Numba begins with a cache that keeps nothing."""
+        self._found = None
+
+
+class _Part(_Kept):
     """A kernel as others contain it, for all types of arguments; Python cannot call it."""
+
+    _kind = _PartCache
 
     def add_overload(self, cres: Any) -> None:
         """Remember what was compiled or loaded for types of arguments."""
         self.overloads[tuple(cres.signature.args)] = cres
 
 
-class Kernel(CPUDispatcher):  # type: ignore[misc]
+class Kernel(_Kept):
     """A function that compiles at its first call; kernels that call it contain its `part`."""
+
+    _kind = KernelCache
 
     @cached_property
     def part(self) -> _Part:
         """The function as kernels contain it."""
         options = {**self.targetoptions, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        part = _Part(self.py_func, self.locals, options, _Compiler)
-        keep(part, _PartCache)
-        return part
+        return _Part(self.py_func, self.locals, options, _Compiler)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """What Numba asks for the types of a call in a kernel."""

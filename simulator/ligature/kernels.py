@@ -18,7 +18,6 @@ import numba
 import numba.np.linalg
 from numba.core import event
 
-from ligature.kernel_cache import keep
 from ligature.kernel_parts import Kernel
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -73,7 +72,6 @@ def compile_with(function: Function, **options: Any) -> Function:
     if numba.config.DISABLE_JIT:
         return function
     dispatcher: Any = Kernel(function, {}, {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, **options})
-    keep(dispatcher)
     return dispatcher  # type: ignore[no-any-return]
 
 
