@@ -5,10 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from ligature.adf import AdfError
 from ligature.adf.nodes import MAX_DEPTH, Mapping, Scalar, Sequence, parse, plain
 
 FILE = Path("scene.yaml")
+LINE_ENDS = st.sampled_from(["\n", "\r\n", "\r"])
 
 
 def test_values_know_their_line_and_column() -> None:
@@ -85,3 +88,34 @@ def test_lists_keep_their_order() -> None:
     bodies = parse("bodies: [BODY b, BODY a]", FILE).get("bodies")
     assert isinstance(bodies, Sequence)
     assert [plain(item) for item in bodies.items] == ["BODY b", "BODY a"]
+
+
+@given(st.lists(st.sampled_from(["a: 1", "# é", "b: {", "c: 2}", ""]), max_size=5), st.integers(0, 3), LINE_ENDS)
+def test_a_character_that_yaml_forbids_is_reported_where_it_is(before: list[str], blanks: int, end: str) -> None:
+    text = end.join([*before, "d: " + " " * blanks + "\a"])
+    place = (
+        f"scene.yaml:{len(before) + 1}:{blanks + 4}: error: invalid YAML: character U\\+0007 is not allowed; remove it"
+    )
+    with pytest.raises(AdfError, match=place):
+        parse(text, FILE)
+
+
+PROPERTIES = st.sampled_from(["", "&x ", "!!str ", "&x !!str ", "&x\n      ", "!!str &x\n      "])
+"""What may stand before a value: an anchor, a tag, on its line or the one before."""
+
+
+@given(PROPERTIES, st.booleans())
+def test_a_value_begins_behind_its_anchor_and_tag(properties: str, relaxed: bool) -> None:
+    head = "flow:\n{\na: 1}\n" if relaxed else ""
+    text = f"{head}block:\n  inner: {properties}value # that\n"
+    block = parse(text, FILE).get("block")
+    assert isinstance(block, Mapping)
+    inner = block.get("inner")
+    assert isinstance(inner, Scalar) and (inner.text, inner.anchor) == ("value", "x" if "&" in properties else "")
+    assert text[slice(*inner.span)] == "value"
+    before = text[: inner.span[0]].split("\n")
+    assert (inner.mark.line, inner.mark.column) == (len(before), len(before[-1]) + 1)
+
+
+def test_the_last_level_that_may_nest_does() -> None:
+    parse("a: " + "[" * MAX_DEPTH + "]" * MAX_DEPTH, FILE)

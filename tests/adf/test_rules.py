@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import ligature
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from ligature.adf import Resolver, Severity, read_any
-from ligature.adf.schema import BY_PATH, SCHEMA, Status
+from ligature.adf.reader import read_text
+from ligature.adf.schema import BY_PATH, LISTS, SCHEMA, Key, Status
+from ligature.adf.schema.bodies import JOINT_TYPES
 
 JOINT = (
     "joints: [J]\nJ:\n  name: j\n  parent: A\n  child: B\n  type: {type}\n"
@@ -178,3 +184,116 @@ def test_a_motor_is_off_by_every_word_for_it(tmp_path: Path, word: str, on: bool
     bodies = "bodies: [A, B]\nA: {name: a, mass: 0}\nB: {name: b, mass: 1}\n"
     (tmp_path / "m.yaml").write_text(bodies + JOINT.format(type="revolute", keys=f"  enable motor: {word}\n"))
     assert ligature.load(tmp_path / "m.yaml").joints[0].motor_enabled is on
+
+
+def reported(text: str, kind: str = "model") -> str:
+    """All findings about a document, one a line."""
+    return "\n".join(str(d) for d in read_text(text, Path("m.yaml"), kind).diagnostics)
+
+
+VALUES = st.sampled_from([-2.0, -1.0, 0.0, 0.25, 1.0, 1.25, 2.0])
+
+
+@given(VALUES, VALUES)
+def test_two_numbers_are_reported_where_they_are_out_of_order(low: float, high: float) -> None:
+    limits = f"  joint limits: {{low: {low}, high: {high}}}\n"
+    assert ("so it is unlimited" in reported(JOINT.format(type="revolute", keys=limits))) is (low > high)
+    planes = f"  look at: {{x: 1, y: 0, z: 0}}\n  clipping plane: {{near: {low}, far: {high}}}\n"
+    assert ("its near clipping plane at" in reported(CAMERA.format(keys=planes), "world")) is (not 0.0 < low < high)
+
+
+@given(VALUES)
+def test_one_number_is_reported_where_it_is_out_of_range(value: float) -> None:
+    for path in (
+        "color rgba: {{r: 0, g: 0, b: {}, a: 0}}",
+        "color components: {{specular: {{r: 0, g: {}, b: 0}}, transparency: 1}}",
+    ):
+        assert ("colours are 0 to 1" in reported(BODY.format(line=path.format(value)))) is (not 0.0 <= value <= 1.0)
+    assert ("has a negative deadband" in reported(DEVICE.format(keys=f"  deadband: {value}\n"), "input devices")) is (
+        value < 0
+    )
+
+
+DIRECTIONS = st.tuples(*[st.integers(-2, 2)] * 3)
+
+
+@given(DIRECTIONS, DIRECTIONS, st.integers(-2, 2), DIRECTIONS | st.just((0, 0, 0)))
+def test_a_camera_has_an_orientation_unless_it_looks_along_its_up(
+    at: tuple[int, ...], ahead: tuple[int, ...], share: int, aside: tuple[int, ...]
+) -> None:
+    up = np.multiply(share, ahead) + aside
+    vectors = {"location": at, "look at": np.add(at, ahead), "up": up}
+    keys = "".join(f"  {name}: {{x: {x}, y: {y}, z: {z}}}\n" for name, (x, y, z) in vectors.items())
+    aligned = not np.cross(ahead, up).any()
+    assert ("has no viewing direction" in reported(CAMERA.format(keys=keys), "world")) is aligned
+
+
+DEVICE = "input devices: [X]\nX:\n  hardware name: h\n{keys}"
+JOINT_KINDS = sorted(set(JOINT_TYPES.values()))
+
+
+@pytest.mark.parametrize("key", ["stiffness", "damping", "equilibrium point"])
+@pytest.mark.parametrize("kind", JOINT_KINDS)
+@pytest.mark.parametrize("block", [False, True])
+def test_only_six_dof_joints_have_blocks_of_springs_and_only_springs_numbers(kind: str, key: str, block: bool) -> None:
+    value = "{linear: {x: 1, y: 1, z: 1}, angular: {x: 1, y: 1, z: 1}}" if block else "1"
+    found = reported(JOINT.format(type=kind, keys=f"  {key}: {value}\n"))
+    assert (f"is a {kind} joint with one number as '{key}'" in found) is ("six dof" in kind and not block)
+    assert (f"is a {kind} joint with a block as '{key}'" in found) is ("six dof" not in kind and block)
+    without = not block and "six dof" not in kind and kind not in ("linear spring", "torsion spring")
+    assert (f"is a {kind} joint, so '{key}' has no effect" in found) is without
+
+
+@pytest.mark.parametrize("kind", JOINT_KINDS)
+@pytest.mark.parametrize("given_", [(), ("low",), ("high",), ("low", "high")])
+def test_limits_count_where_both_are_given(kind: str, given_: tuple[str, ...]) -> None:
+    keys = f"  joint limits: {{{', '.join(f'{end}: 1' for end in given_)}}}\n"
+    found, spring = reported(JOINT.format(type=kind, keys=keys)), kind in ("linear spring", "torsion spring")
+    assert ("without limits, which locks it" in found) is (spring and len(given_) < 2)
+    assert ("of its limits, so it is unlimited" in found) is (
+        len(given_) == 1 and (spring or kind in ("revolute", "prismatic"))
+    )
+
+
+@pytest.mark.parametrize(("one", "other"), itertools.product([False, True], repeat=2))
+def test_one_of_two_keys_is_enough(one: bool, other: bool) -> None:
+    keys = "  simulated multibody: m.yaml\n" * one + "  root link: B\n" * other
+    assert ("has nothing to drive" in reported(DEVICE.format(keys=keys), "input devices")) is not (one or other)
+    wheel = ", ".join(["body: B"] * one + ["mesh: m.obj"] * other)
+    vehicle = f"  chassis: B\n  wheels: [{{{wheel}}}]\n"
+    assert ("has neither body nor mesh" in reported(OBJECT.format(list="vehicles", keys=vehicle))) is not (one or other)
+
+
+UNUSED = [
+    (kind, key)
+    for kind in ("body", "joint", "sensor", "camera", "light", "soft body")
+    for key in SCHEMA[kind]
+    if key.status in (Status.UNUSED, Status.IGNORED) and not key.block
+]
+
+
+@pytest.mark.parametrize(("kind", "key"), UNUSED, ids=[f"{kind}-{key.path}" for kind, key in UNUSED])
+def test_a_key_without_effect_is_reported_at_debug(kind: str, key: Key) -> None:
+    (list_,) = (name for name, listed in LISTS.items() if listed == kind)
+    other = ", other than in AMBF" if key.status is Status.UNUSED else ""
+    found = reported(
+        OBJECT.format(list=list_, keys=f"  {key.path}: 1\n"), "world" if list_ in BY_PATH["world"] else "model"
+    )
+    here = " here" if other else ""
+    assert f"debug: key '{key.path}' of {kind} 'X' has no effect{here}{other}; " in found
+
+
+@pytest.mark.parametrize("item", ["3", "[1]", "~"])
+def test_an_item_that_is_no_block_is_reported(item: str) -> None:
+    found = reported(OBJECT.format(list="sensors", keys=f"  type: proximity\n  array: [{item}]\n"))
+    assert "m.yaml:5:11: error: 'array' of sensor 'X' is not usable; expected a block of keys" in found
+
+
+def test_only_a_word_of_a_choice_costs_its_object_and_not_the_file() -> None:
+    body, joint = OBJECT.format(list="bodies", keys="  mass: abc\n"), JOINT.format(type="wobbly", keys="")
+    codes = [d.code for text in (body, joint) for d in read_text(text, Path("m.yaml"), "model").diagnostics]
+    assert [code for code in codes if code in ("value", "left out")] == ["value", "left out"]
+
+
+def test_a_file_that_lacks_a_key_is_reported() -> None:
+    assert "launch 'm.yaml' lacks the key 'world config'" in reported("multibody configs: []\n", "launch")

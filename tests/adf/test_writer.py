@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from ligature.adf import Resolver, read_any
@@ -15,6 +16,12 @@ from ligature.adf.writer import scalar_text, write_document
 @given(st.floats(allow_nan=False))
 def test_numbers_keep_all_their_digits(value: float) -> None:
     assert number(scalar_text(value)) == value
+
+
+@given(st.floats(allow_nan=False) | st.integers(-9, 9).map(lambda k: float(10**30 * k)))
+def test_other_readers_of_yaml_take_a_number_for_one(value: float) -> None:
+    read = yaml.safe_load(scalar_text(value))
+    assert isinstance(read, float) and read == value
 
 
 @given(st.text(max_size=30))
@@ -35,6 +42,12 @@ def test_keys_come_in_the_order_of_the_schema() -> None:
         "bodies:\n- BODY a\nnamespace: /env/\nBODY a:\n  name: needle\n  mass: 1.5\n  location:\n"
         "    orientation: {y: 0, r: 1, p: 2}\n    position: {x: 1, y: 2, z: 3}\n"
     )
+
+
+@given(st.permutations(["note", "B", "bodies", "C", "A"]), st.permutations("ABC"))
+def test_objects_come_in_the_order_of_their_list_and_all_else_behind(keys: list[str], listed: list[str]) -> None:
+    values = {key: listed if key == "bodies" else {"name": key} for key in keys}
+    assert list(plain(parse(write_document("model", values), Path("x")))) == ["bodies", *listed, "note"]
 
 
 def test_every_corpus_file_written_anew_reads_the_same(corpus: Path) -> None:

@@ -17,7 +17,7 @@ import yaml
 
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 from ligature.adf.relax import Relaxed, relax
-from ligature.adf.slips import remedy
+from ligature.adf.slips import lines_of, remedy
 
 MAX_DEPTH = 64
 MAX_NODES = 1_000_000
@@ -125,8 +125,8 @@ _CONTROL = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\
 def _first_control(parsed: Relaxed, file: Path) -> Mark:
     """Place of the first character that YAML forbids."""
     found = _CONTROL.search(parsed.text)
-    before = parsed.text[: found.start() if found else 0]
-    line, column = before.count("\n"), len(before) - before.rfind("\n") - 1
+    before = lines_of(parsed.text[: found.start() if found else 0])
+    line, column = len(before) - 1, len(before[-1])
     return Mark(file, line + 1, parsed.original(line, column, 0)[0] + 1)
 
 

@@ -26,9 +26,14 @@ _REMEDIES = (
 """Beginnings of what the YAML library says, and what is right."""
 
 
+def lines_of(text: str) -> list[str]:
+    """The lines of ``text``, with the line ends of any system."""
+    return re.split("\r\n|\r|\n", text)
+
+
 def remedy(text: str, error: Any) -> str:
     """What to do about a YAML ``error`` in ``text``, which has a problem and where it and its context are."""
-    lines = re.split("\r\n|\r|\n", text)
+    lines = lines_of(text)
     at = error.problem_mark or error.context_mark
     for number in (at.line, *_before(lines, at.line)):
         for slip, words in _SLIPS:
