@@ -148,6 +148,28 @@ def test_too_little_shared_memory_is_reported_before_anything_runs(monkeypatch: 
     assert not (FOLDER / f"ligature-{os.getpid()}-00000002").exists()
 
 
+def test_a_folder_that_takes_no_file_is_reported_and_a_name_twice_is_an_error_of_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ligature.bus.block.FOLDER", tmp_path / "none")
+    with pytest.raises(BusError, match="cannot make the shared memory '.*/none/twice': No such file or directory"):
+        Block.create("twice", DTYPE)
+    monkeypatch.setattr("ligature.bus.block.FOLDER", tmp_path)
+    made = Block.create("twice", DTYPE)
+    with pytest.raises(FileExistsError):
+        Block.create("twice", DTYPE)
+    made.close()
+
+
+def test_a_closed_block_leaves_no_file_open(block: Block) -> None:
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(3):
+        Block.attach(NAME, DTYPE, empty=True).close()
+        with pytest.raises(BusError):
+            Block.attach(NAME, np.dtype([("tick", "u8"), ("values", "f8", (99999,))]), timeout=0.0)
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
 def test_another_layout_is_refused(block: Block) -> None:
     with pytest.raises(BusError, match="belongs to another scene or version"):
         Block.attach(NAME, np.dtype([("tick", "u8"), ("values", "f8", (99999,))]), timeout=0.05)

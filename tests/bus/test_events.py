@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from ligature.bus.events import LOG_BYTES, SLOTS, BusEvent, EventLog
+from hypothesis import given
+from hypothesis import strategies as st
+from ligature.bus.events import LOG_BYTES, MOST_BYTES, SLOTS, BusEvent, EventLog
 
 
 @pytest.fixture
@@ -49,3 +51,14 @@ def test_a_text_too_long_for_a_slot_is_cut(memory: bytearray) -> None:
     assert event.name == "error"
     assert 20 < len(event.value) < 2000
     assert set(event.value) == {"é"}
+
+
+@given(st.integers(MOST_BYTES - 30, MOST_BYTES + 30), st.integers(0, 3))
+def test_a_text_is_cut_only_where_it_is_too_long(length: int, wide: int) -> None:
+    log = EventLog(memoryview(bytearray(LOG_BYTES)))
+    room = MOST_BYTES - len('[0, "e", ""]') - 5 * wide
+    text = "é" * wide + "a" * (length - wide)
+    log.write(0, "e", text)
+    (event,) = log.read()
+    assert event.value == (text if length <= room else text[: len(event.value)])
+    assert min(length, room) - 12 <= len(event.value)
