@@ -16,7 +16,7 @@ from ligature.adf import Diagnostic, Severity
 from ligature.model.frames import inverse
 from ligature.model.piercing import Hole
 from ligature.model.scene import Body, Ghost
-from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Shape, Sphere
+from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Shape, Sphere, TriMesh
 
 Array = NDArray[np.float64]
 
@@ -53,14 +53,9 @@ def find_holes(ghosts: Sequence[Ghost], bodies: Sequence[Body]) -> tuple[tuple[H
 
 def _opening(shape: Shape) -> tuple[Array, Array]:
     """Axes (3, 3) of the opening in the frame of a ghost's shape, z through it, and its half sizes (2,)."""
-    if isinstance(shape, Box):
-        thin = int(np.argmin(shape.size))
-        R = np.array(Z_TO[thin])
-        return R, np.asarray(0.5 * np.abs(R.T @ shape.size)[:2])
-    if isinstance(shape, Hull):
-        size = np.ptp(shape.vertices, axis=0)
-        thin = int(np.argmin(size))
-        R = np.array(Z_TO[thin])
+    if isinstance(shape, Box | Hull | TriMesh):
+        size = shape.size if isinstance(shape, Box) else np.ptp(shape.vertices, axis=0)
+        R = np.array(Z_TO[int(np.argmin(size))])
         return R, np.asarray(0.5 * np.abs(R.T @ size)[:2])
     radius = shape.radius if isinstance(shape, Sphere | Cylinder | Capsule | Cone) else 0.0
     return np.eye(3), np.full(2, radius)
