@@ -56,9 +56,13 @@ def test_bare_keys_in_a_flow_map_are_null() -> None:
     assert plain(parse("c: {P: 20, I, 0., D: 0.1}", FILE)) == {"c": {"P": "20", "I": None, "0.": None, "D": "0.1"}}
 
 
-def test_an_alias_bomb_is_refused() -> None:
-    lines = ["a0: &a0 [x,x,x,x,x,x,x,x,x,x]"]
-    lines += [f"a{i}: &a{i} [{','.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 9)]
+@pytest.mark.parametrize("block", ["[{}]", "{{{}}}"])
+def test_an_alias_bomb_is_refused(block: str) -> None:
+    """Of lists, and of mappings."""
+    lines = ["a0: &a0 x"]
+    for i in range(1, 10):
+        items = [f"*a{i - 1}" if block[0] == "[" else f"{key}: *a{i - 1}" for key in "abcdefghij"]
+        lines.append(f"a{i}: &a{i} {block.format(', '.join(items))}")
     with pytest.raises(AdfError, match="aliases expand to more than"):
         parse("\n".join(lines), FILE)
 

@@ -87,6 +87,10 @@ def test_a_loop_closes_from_where_it_is_open_with_its_joints_within_their_limits
     assert mechanism.hard_gap(loop.x, RCOND) < 1e-6
 
 
+def test_the_size_is_that_of_the_mechanism(tmp_path: Path) -> None:
+    assert Loop("pair", "p2p", False, tmp_path).mechanism.size == pytest.approx(0.6)
+
+
 def test_coordinates_that_were_written_back_give_the_same_poses(loop: Loop) -> None:
     again = loop.mechanism.poses(loop.x)
     for body, T in loop.poses.items():

@@ -15,6 +15,8 @@ from ligature.model.needles import LONGEST, SLENDER, WIDEST_TURN, fit_arc
 from ligature.model.piercing import Needle
 from ligature.model.scene import Scene
 
+from tests.model.test_load import chain
+
 ANGLES = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
 
 
@@ -90,3 +92,55 @@ def test_a_body_that_a_joint_holds_is_none(tmp_path: Path) -> None:
     frames = "parent pivot: {x: 0, y: 0, z: 0}, child pivot: {x: 0, y: 0, z: 0}, parent axis: {x: 0, y: 0, z: 1}, child axis: {x: 0, y: 0, z: 1}"
     joint = f"J: {{name: j, type: revolute, parent: T, child: N, {frames}}}\n"
     assert needles(tmp_path, 0.01, 2.0, more=joint) == ()
+
+
+@pytest.mark.parametrize("at_end", [False, True])
+@pytest.mark.parametrize("parent", [False, True])
+def test_the_tip_is_away_from_the_thread(tmp_path: Path, at_end: bool, parent: bool) -> None:
+    turn = 2.0
+    ends = np.array([[0.01 * math.cos(angle), 0.01 * math.sin(angle), 0.0] for angle in (0.0, turn)])
+    x, y, _ = tail = ends[int(at_end)]
+    file = tmp_path / "m.yaml"
+    loaded(tmp_path, 0.01, turn)
+    needle = [line for line in file.read_text().splitlines() if line.startswith("N:")][0]
+    thread = chain().replace("bodies: [", "bodies: [N, ").replace("joints: [", "joints: [JN, ")
+    for k in range(5):
+        old = f"position: {{x: 0, y: 0, z: {0.01 * k}}}"
+        thread = thread.replace(old, f"position: {{x: {x:.6f}, y: {y:.6f}, z: {0.01 * k + 0.005}}}")
+    places = [f"{{x: {x:.6f}, y: {y:.6f}, z: 0}}", "{x: 0, y: 0, z: -0.005}"]
+    one, two = ("N", "T0") if parent else ("T0", "N")
+    first, second = places if parent else reversed(places)
+    joint = (
+        f"JN: {{name: jn, type: fixed, parent: {one}, child: {two}, parent pivot: {first}, child pivot: {second}, "
+        "parent axis: {x: 0, y: 0, z: 1}, child axis: {x: 0, y: 0, z: 1}}\n"
+    )
+    file.write_text(f"{thread}{needle}\n{joint}")
+    scene = ligature.load(file)
+    assert len(scene.rods) == 1
+    (found,) = scene.needles
+    np.testing.assert_allclose(found.arc.point(found.arc.length), tail, atol=1e-5)
+    np.testing.assert_allclose(found.arc.point(0.0), ends[int(not at_end)], atol=1e-5)
+    assert found.arc.begin < found.arc.end
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        "shape: CAPSULE, geometry: {radius: 0.0002, height: 0.002, axis: X}",
+        "shape: CYLINDER, geometry: {radius: 0.0002, height: 0.002, axis: X}",
+        "shape: BOX, geometry: {x: 0.002, y: 0.0004, z: 0.0004}",
+    ],
+)
+def test_a_shape_counts_by_its_middle_line(tmp_path: Path, shape: str) -> None:
+    """Ten shapes of 2 mm along 20 mm of an arc: what they reach beyond it, and beside it, is small."""
+    items = ", ".join(
+        f"{{{shape}, offset: {{position: {{x: {0.01 * math.cos(a):.9f}, y: {0.01 * math.sin(a):.9f}, z: 0}}, "
+        f"orientation: {{r: 0, p: 0, y: {a + math.pi / 2:.9f}}}}}}}"
+        for a in np.arange(0.1, 2.0, 0.2)
+    )
+    (tmp_path / "m.yaml").write_text(
+        f"bodies: [N]\nN: {{name: n, mass: 0.001, inertial offset: {{}}, compound collision shape: [{items}]}}\n"
+    )
+    (needle,) = ligature.load(tmp_path / "m.yaml").needles
+    assert needle.arc.length == pytest.approx(0.02, rel=0.01)
+    assert needle.arc.radius == pytest.approx(0.01, rel=0.01)

@@ -67,3 +67,10 @@ def test_kinds_arrive_in_their_order_and_names_within_them() -> None:
     arrivals.enter(objects)
     assert list(arrivals.known) == list(ARRIVAL)
     assert all([name for name, _ in known] == ["a", "b"] for known in arrivals.known.values())
+
+
+def test_a_name_in_part_is_reported_with_the_object_that_was_taken() -> None:
+    arrivals = Arrivals()
+    arrivals.wait("ghost", 0, "/g", "x", None)
+    arrivals.enter([("ghost", 0, "/g", "g"), ("body", 0, "/a/x", "x")])
+    assert [d.message for d in arrivals.diagnostics] == ["parent 'x' is incomplete; using '/a/x'"]

@@ -79,6 +79,14 @@ def test_a_body_commands_the_active_joints_below_it(count: int, rng: random.Rand
         assert [joints[joint].child for joint in commanded] == list(children)
 
 
+@given(PAIRS)
+def test_a_body_commands_each_other_one_by_one_joint_at_most(drawn: Drawn) -> None:
+    joints = joints_of(drawn, MOST)
+    for commanded, children in command_vectors(MOST, joints):
+        assert len(set(children)) == len(children) == len(set(commanded)) == len(commanded)
+        assert [joints[joint].child for joint in commanded] == list(children)
+
+
 @pytest.mark.parametrize("looped", [False, True])
 def test_a_chain_is_commanded_from_base_to_tip(looped: bool) -> None:
     chain = [(k, k + 1, JointType.REVOLUTE, False) for k in range(MOST - 1)]
