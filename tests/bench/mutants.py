@@ -80,6 +80,7 @@ PARTS = {
     "bus.recording": "bus/test_recording.py",
     "bus.watchdog": "bus/test_watchdog.py",
     "robots.chain": "robots/test_chain.py",
+    "robots.fitting": "robots/test_fitting.py",
     "robots.impedance": "robots/test_impedance.py",
     "robots.instruments": "robots/test_instruments.py",
     "robots.operating_state": "robots/test_operating_state.py",
