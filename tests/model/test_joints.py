@@ -118,8 +118,22 @@ def test_the_frames_of_a_joint_meet_at_zero(tmp_path: Path, kind: str, offset: s
     np.testing.assert_allclose(T_a[:3, 3], (0.1, 0.2, 0.3), atol=1e-9)
     np.testing.assert_allclose(T_b, T_a, atol=1e-9)
     np.testing.assert_allclose(parent.T_body_inertial[:3, :3] @ found.axis, (0, 0.6, 0.8), atol=1e-9)
+    for axis in axes_of(found) or ():
+        np.testing.assert_allclose(found.T_parent_a[:3, :3] @ axis.direction, found.axis, atol=1e-9)
     bare = joint(tmp_path, kind)
     assert np.allclose(found.T_parent_child_zero, bare.T_parent_child_zero) is not bool(offset)
+
+
+def test_pivots_grow_with_the_scale_of_their_bodies(tmp_path: Path) -> None:
+    loaded(tmp_path, "revolute")
+    file = tmp_path / "m.yaml"
+    file.write_text(file.read_text().replace("A: {", "A: {scale: 2, ").replace("B: {", "B: {scale: 3, "))
+    scene = ligature.load(file)
+    found = scene.joints[0]
+    for T, body, pivot in zip(
+        (found.T_parent_a, found.T_child_b), scene.bodies, ((0.2, 0.4, 0.6), (0, -0.3, 0)), strict=True
+    ):
+        np.testing.assert_allclose((body.T_body_inertial @ T)[:3, 3], pivot, atol=1e-9)
 
 
 def test_bodies_that_are_held_as_they_stand_do_not_move(tmp_path: Path) -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ligature.model.frames import quaternion_matrix
+from ligature.model.frames import frame, matrix_pose7, quaternion_matrix
 from ligature.robots.chain import Chain, Convention, Link
 from ligature.robots.ecm import Ecm, SrcCamera
 from ligature.robots.mtm import Mtm
+from ligature.robots.poses import turned
 from ligature.robots.psm import Psm
 
 from tests.robots import examples
@@ -120,3 +121,28 @@ def test_limits_cannot_be_changed_by_accident(arm):
         arm.lower[0] = -10.0
     assert arm.lower.shape == arm.upper.shape == (arm.n,)
     assert np.all(arm.lower < arm.upper)
+
+
+@pytest.mark.parametrize("absolute", [False, True])
+def test_what_an_arm_reports_of_its_tip_is_what_each_function_gives(arm, absolute):
+    rng = np.random.default_rng(arm.n)
+    measured, setpoint, wrench = (
+        rng.uniform(-0.5, 0.5, (3, arm.n)),
+        rng.uniform(-0.5, 0.5, (3, arm.n)),
+        rng.uniform(-1, 1, 6),
+    )
+    base = frame(quaternion_matrix([0.1, 0.7, -0.1, 0.7]), (0.1, 0.2, 0.3))
+    js, poses, vectors, jacobians = np.zeros((2, 3, arm.n)), np.zeros((4, 7)), np.zeros((4, 6)), np.zeros((2, 6, arm.n))
+    arm.describe(base, absolute, measured, setpoint, wrench, js, poses, vectors, jacobians)
+    np.testing.assert_array_equal(js, [measured, setpoint])
+    tips = arm.forward([measured[0], setpoint[0]])
+    for pose_, T in zip(poses, [*(base @ tips), *tips], strict=True):
+        np.testing.assert_allclose(pose_, matrix_pose7(T), atol=1e-12)
+    np.testing.assert_allclose(
+        jacobians, [arm.jacobian_body(measured[0]), arm.jacobian_spatial(measured[0])], atol=1e-12
+    )
+    R = tips[0, :3, :3]
+    twist = turned(R, jacobians[0] @ measured[1])
+    on_tip = wrench if absolute else turned(R.T, wrench)
+    expected = [turned(base[:3, :3], twist), twist, on_tip, turned(base[:3, :3], wrench)]
+    np.testing.assert_allclose(vectors, expected, atol=1e-12)
