@@ -64,7 +64,7 @@ PARTS = {
     "model.holes": "model/test_holes.py",
     "model.trees": "model/test_trees.py,model/test_load.py",
     "model.axes": "model/test_joints.py,model/test_mechanism.py",
-    "model.joints": "model/test_joints.py,model/test_load.py",
+    "model.joints": "model/test_joints.py,adf/test_rules.py",
     "model.parenting": "model/test_parenting.py,model/test_load.py",
     "model.mechanism": "model/test_mechanism.py",
     "model.naming": "model/test_naming.py,model/test_load.py,model/test_prefix.py,model/test_proxies.py",
