@@ -190,7 +190,7 @@ def program(tmp_path: Path) -> str:
 
 
 def test_a_kernel_that_is_new_links_with_one_that_was_kept(tmp_path: Path) -> None:
-    """Of a kernel that is loaded, only bitcode is left to link with."""
+    """Of a kernel that Python called before, there is no code to link with."""
     (tmp_path / "linked.py").write_text(LINKED)
     environment = {"PYTHONPATH": str(tmp_path), "LIGATURE_CACHE": str(tmp_path / "cache")}
     first = run("from linked import *; print(twice(2.0))", **environment)

@@ -242,7 +242,7 @@ def _warn_of_writes(reason: str) -> None:
     _log.warning("kernels cannot be kept and will be compiled again at the next start: %s", reason)
 
 
-def cache_of(function: Any, kind: type[KernelCache] = KernelCache) -> Any:
+def cache_of(function: Any, kind: type[KernelCache]) -> Any:
     """What keeps the code of a kernel: nothing does where its source is no file or nothing can be written."""
     file = Path(inspect.getfile(function))
     if file.exists() and kernel_folder(file.resolve(), function.__module__) is not None:

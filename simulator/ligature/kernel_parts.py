@@ -2,7 +2,7 @@
 
 Numba makes of each function what a call from Python needs: wrappers that unpack its arguments, optimised code and
 machine code. What contains a kernel needs none of them, for all that it contains is optimised and compiled with it.
-Most kernels are called by kernels alone: without what nothing calls, all of them take two fifths of the time.
+Most kernels are called by kernels alone: without what nothing calls, all of them take half of the time or less.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class _Kept(CPUDispatcher):  # type: ignore[misc]
 
 
 class _Part(_Kept):
-    """A kernel as others contain it, for all types of arguments; Python cannot call it."""
+    """A kernel as others contain it, for all types of arguments; Python cannot call it, nor can it call itself."""
 
     _kind = _PartCache
 

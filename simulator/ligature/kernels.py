@@ -71,8 +71,8 @@ def compile_with(function: Function, **options: Any) -> Function:
     """Like `compiled`, with options of `numba.njit`."""
     if numba.config.DISABLE_JIT:
         return function
-    dispatcher: Any = Kernel(function, {}, {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, **options})
-    return dispatcher  # type: ignore[no-any-return]
+    options = {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, **options}
+    return Kernel(function, {}, options)  # type: ignore[return-value]
 
 
 class _Compilation(event.Listener):
