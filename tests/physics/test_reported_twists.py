@@ -87,6 +87,7 @@ def test_every_linkage_moves_with_the_twists_that_are_reported(tmp_path: Path) -
     assert not misses(range(13, 300), tmp_path)
 
 
+@pytest.mark.usefixtures("hulls")
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_of_others_move_with_the_twists_that_are_reported(name: str, corpus: Path) -> None:
     scene = ligature.load(corpus / "multibodies/descriptions/multi-bodies" / name, roots=[corpus])
