@@ -48,7 +48,9 @@ def leftovers(rod: Rod) -> Iterator[Array]:
         yield array[filled:]
 
 
-@pytest.mark.parametrize("name", [*OURS, FALLING])
+@pytest.mark.parametrize(
+    "name", [*OURS[::2], FALLING, *(pytest.param(name, marks=pytest.mark.slow) for name in OURS[1::2])]
+)
 def test_no_tick_of_a_scene_reads_scratch_of_an_earlier_one(name: str) -> None:
     scene, ends = scene_of(name), {}
     for how in ("", *SPOILS):

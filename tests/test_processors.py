@@ -70,7 +70,7 @@ def here(ticks: int, names: tuple[str, ...]) -> dict[str, str]:
     return run({}, ticks, names)
 
 
-@pytest.mark.parametrize("processor", PROCESSORS)
+@pytest.mark.parametrize("processor", ["the oldest one", "one with AVX-512"])
 def test_another_processor_computes_the_same_bits(processor: str) -> None:
     assert run(PROCESSORS[processor], 120, QUICK) == here(120, QUICK)
 

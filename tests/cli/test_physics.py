@@ -151,7 +151,7 @@ def test_no_command_makes_the_state_anything_but_finite() -> None:
     block = Block.create(f"ligature-{os.getpid()}-f0", simulation.state.dtype)
     mailbox = Mailbox(simulation.scene, block.rings)
     commands = random_commands(simulation.scene, random.Random(5))
-    for _ in range(600):
+    for _ in range(300):
         for _ in range(3):
             block.rings["ros"].push(encode(next(commands)))
         for message in mailbox.take():
@@ -159,6 +159,6 @@ def test_no_command_makes_the_state_anything_but_finite() -> None:
         simulation.step()
         for name in ("body_pose", "body_twist", "joint_position", "joint_velocity", "camera_world"):
             assert np.isfinite(simulation.state[name]).all(), name
-    assert mailbox.rejected > 100
+    assert mailbox.rejected > 50
     block.close()
     simulation.close()

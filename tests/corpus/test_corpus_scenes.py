@@ -259,8 +259,9 @@ def test_joints_at_zero_agree_with_the_locations(corpus: Path, name: str, count:
     assert scene.joints and differ == count
 
 
+@pytest.mark.slow  # `make test` looks at the same files in an archive (tests/adf/test_resolver.py)
 @pytest.mark.usefixtures("hulls")
-@pytest.mark.parametrize("strict", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("strict", [False, True])
 def test_no_file_makes_a_traceback(corpus: Path, strict: bool) -> None:
     from ligature.cli.check import findings
 

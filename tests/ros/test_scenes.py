@@ -16,9 +16,15 @@ from tests.ros.crtk import Psm
 pytestmark = pytest.mark.ros
 TRIED_ELSEWHERE = ("suturing", "suturing_small")
 LAUNCHES = sorted(path for path in ROOT.glob("scenes/*/launch*.yaml") if path.parent.name not in TRIED_ELSEWHERE)
+QUICK = ("blender_suturing", "ligating", "soft_suturing")
+"""Scenes that `make test` runs: written by Blender, without a needle, with soft tissue; `make test-slow` runs them all."""
 
 
-@pytest.mark.parametrize("launch", LAUNCHES, ids=lambda path: path.parent.name)
+@pytest.mark.parametrize(
+    "launch",
+    [pytest.param(path, marks=[] if path.parent.name in QUICK else [pytest.mark.slow]) for path in LAUNCHES],
+    ids=[path.parent.name for path in LAUNCHES],
+)
 def test_a_scene_of_ours_answers(
     launch: Path, ros_env: dict[str, str], node: Any, listen: Callable[..., Listener]
 ) -> None:

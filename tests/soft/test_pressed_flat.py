@@ -69,7 +69,7 @@ def check(material, simulation, points):
 SMALL = st.floats(-0.008, 0.008)
 
 
-@settings(max_examples=6, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=3, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(
     material=st.sampled_from(sorted(MATERIALS)), radius=st.floats(0.003, 0.012), density=st.floats(2.7, 4.8),
     speed=st.floats(0.0, 2.0), at=st.tuples(SMALL, SMALL),

@@ -131,7 +131,7 @@ threads = given(
 )  # fmt: skip
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @threads
 def test_forces_of_a_careful_step_follow_the_laws_of_contact_and_friction(
     seed: int, movable: bool, friction: float
@@ -156,7 +156,7 @@ def test_forces_of_a_careful_step_follow_the_laws_of_contact_and_friction(
         np.testing.assert_allclose(along, expected, rtol=0.0, atol=error)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @threads
 def test_forces_of_a_careful_step_balance_inertia_and_joints(seed: int, movable: bool, friction: float) -> None:
     bench, rod = thread_on_a_post(seed, movable, friction)
