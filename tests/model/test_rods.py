@@ -124,3 +124,25 @@ def test_a_thread_with_elements_at_the_wrong_place_stays_in_one_piece(tmp_path: 
         assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() < 1.05 * LENGTH
     finally:
         simulation.close()
+
+
+@given(which=st.integers(0, N - 1), length=st.sampled_from([0.0, 1e-9, 4e-7]))
+@settings(max_examples=12, deadline=None)
+def test_a_chain_with_an_element_without_length_stays_bodies_and_is_reported(
+    tmp_path_factory: pytest.TempPathFactory, which: int, length: float
+) -> None:
+    """Its joints meet the element at one place, or one at the middle of an end."""
+    folder = tmp_path_factory.mktemp("short")
+    thread(folder, {})
+    path = folder / "model.yaml"
+    model = yaml.safe_load(path.read_text())
+    for joint, side, sign in ((which - 1, "child", -0.5), (which, "parent", 0.5)):
+        if f"JOINT {joint}" in model:
+            model[f"JOINT {joint}"][f"{side} pivot"] = xyz(sign * length, 0, 0)
+    path.write_text(yaml.safe_dump(model, sort_keys=False))
+    scene = ligature.load(path)
+    (found,) = [d for d in scene.diagnostics if d.code == "rod"]
+    assert not scene.rods and f"the joints of 'BODY {which}' leave it no length" in found.message
+    simulation = ligature.Simulation(scene)
+    simulation.step(10)
+    simulation.close()

@@ -87,6 +87,7 @@ def test_the_axis_of_a_symmetric_needle_goes_round_its_momentum(size: float, rat
         ((1e-12, 1e-12, 1e-12), (1e-12, 1e-12, 1e-12), ""),
         ((3e-17, 1e-12, 1e-12), (LEAST_INERTIA, 1e-12, 1e-12), "moments below 1e-15 kg m² cannot be simulated"),
         ((0.0, 1e-12, 1e-12), (4e-11, 1e-12, 1e-12), "give 'inertia'; these are a ball's of 1 cm radius"),
+        ((1e12, 1e-4, 2e-4), (1e3, 1e-4, 2e-4), "moments above 1e+07 times the smallest cannot be simulated"),
     ],
 )
 def test_moments_that_are_replaced_are_reported(
@@ -98,3 +99,35 @@ def test_moments_that_are_replaced_are_reported(
     found = [d for d in findings(tmp_path / "model.yaml", [], False) if d.code == "inertia"]
     assert [str(d).rpartition("; ")[2] for d in found] == ([text.rpartition("; ")[2]] if text else [])
     assert all("body 'Needle'" in d.message and d.mark is not None and d.mark.line == 5 for d in found)
+
+
+LIMB = (
+    "gravity: {{x: 0, y: 0, z: {gravity}}}\nbodies: [Wall, Upper, Lower]\njoints: [Ball, Hinge]\n"
+    "Wall: {{name: Wall, mass: 0, location: {{}}}}\n"
+    "Upper: {{name: Upper, mass: 0.03, inertia: {{ix: {0}, iy: {1}, iz: {2}}}, "
+    "location: {{position: {{x: 0.07, y: 0, z: 0}}}}}}\n"
+    "Lower: {{name: Lower, mass: 0.3, inertia: {{ix: 0.001, iy: 0.001, iz: 0.001}}, "
+    "location: {{position: {{x: 0.14, y: 0, z: 0}}}}}}\n"
+    "Ball: {{name: Ball, type: p2p, parent: Wall, child: Upper, parent axis: {{x: 0, y: 0, z: 1}}, child axis: {{x: 0, y: 0, z: 1}}, parent pivot: {{x: 0, y: 0, z: 0}}, "
+    "child pivot: {{x: -0.07, y: 0, z: 0}}}}\n"
+    "Hinge: {{name: Hinge, type: revolute, parent: Upper, child: Lower, parent axis: {{x: 1, y: 2, z: 3}}, "
+    "child axis: {{x: 1, y: 2, z: 3}}, parent pivot: {{x: 0.035, y: 0, z: 0}}, child pivot: {{x: -0.035, y: 0, z: 0}}}}\n"
+)
+"""A body whose moments are given hangs by a ball joint, and another one by an oblique hinge on it."""
+
+SMALL, LARGE = (st.floats(*span).map(lambda exponent: 10.0**exponent) for span in ((-9.0, -4.0), (-4.0, 11.9)))
+
+
+@given(own=st.tuples(SMALL, SMALL, LARGE).flatmap(st.permutations), gravity=st.sampled_from([0.0, -9.81]))
+@ONCE
+def test_bodies_with_any_moments_swing_no_faster_than_they_fall(
+    own: list[float], gravity: float, simulate: Make
+) -> None:
+    simulation = simulate(LIMB.format(*own, gravity=gravity))
+    assert len(simulation.scene.joints) == 2
+    for _ in range(40):
+        simulation.step(25)
+        assert np.isfinite(simulation.state["body_pose"]).all()
+        assert np.linalg.norm(simulation.state["body_twist"][0, :, :3], axis=1).max() < 5.0
+    assert not [problem for problem in simulation.problems if problem.code == "diverged"]
+    simulation.close()

@@ -351,3 +351,23 @@ def test_a_loop_that_diverges_restarts_as_a_whole(tmp_path: Path) -> None:
     np.testing.assert_allclose(sim.state["body_pose"], start, atol=1e-9)
     assert gaps(sim).max() < 1e-6
     sim.close()
+
+
+@pytest.mark.parametrize("type_", ["revolute", "prismatic", "p2p", "fixed", "torsion spring", "linear spring"])
+@pytest.mark.parametrize("masses", [(0, 0), (0, 0.5), (0.5, 0)])
+def test_two_bodies_may_have_two_joints_whether_they_move_or_not(
+    type_: str, masses: tuple[float, float], tmp_path: Path
+) -> None:
+    keys = "axis: {x: 0, y: 0, z: 1}", "pivot: {x: 0, y: 0, z: 0}"
+    both = ", ".join(f"{side} {key}" for side in ("parent", "child") for key in keys)
+    lines = ["bodies: [A, B]", "joints: [J, K]"]
+    lines += [
+        f"{name}: {{name: {name}, mass: {mass}, location: {{}}}}" for name, mass in zip("AB", masses, strict=True)
+    ]
+    lines += [f"{name}: {{name: {name}, type: {type_}, parent: A, child: B, {both}}}" for name in "JK"]
+    file = tmp_path / "twice.yaml"
+    file.write_text("\n".join(lines))
+    simulation = ligature.Simulation(ligature.load(file))
+    simulation.step(20)
+    assert np.isfinite(simulation.state["body_pose"]).all()
+    simulation.close()

@@ -19,6 +19,8 @@ from ligature.model.scene import Body, Joint, JointType, RodChain, Sensor, Senso
 from ligature.model.shapes import Capsule, Cylinder, Sphere
 
 LEAST_ELEMENTS = 4
+LEAST_LENGTH = 1e-3
+"""Length of a rod's element over its radius; a chain with a shorter one stays bodies."""
 
 
 def find_rods(
@@ -28,10 +30,12 @@ def find_rods(
 
     ``opted_out`` are bodies that must stay bodies.
     """
-    rods, between = _without_joints_between(_chains(bodies, joints, opted_out), joints)
+    chains = _chains(bodies, joints, opted_out)
+    rods, between = _without_joints_between([chain for chain in chains if _short(chain) is None], joints)
     moved, findings = _joined(rods, bodies, joints)
     placed = [replace(b, T_world_body=moved[b.index]) if b.index in moved else b for b in bodies]
     findings += [_finding_of_joint(joint) for joint in between]
+    findings += [_finding_of_length(chain, bodies[short]) for chain in chains if (short := _short(chain)) is not None]
     elements = {body for rod in rods for body in rod.bodies}
     findings += [
         _finding_of_sensor(sensor)
@@ -53,6 +57,20 @@ def _finding_of_sensor(sensor: Sensor) -> Diagnostic:
     message = f"resistance sensor '{sensor.identity.key}' applies no force to the rod that carries it"
     hint = "mount it on a body, or set 'ligature rod: false'"
     return Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "rod")
+
+
+def _short(chain: RodChain) -> int | None:
+    """The first body of a chain that is too short for an element."""
+    short = np.flatnonzero(chain.lengths < LEAST_LENGTH * chain.radius)
+    return chain.bodies[short[0]] if len(short) else None
+
+
+def _finding_of_length(chain: RodChain, short: Body) -> Diagnostic:
+    message = (
+        f"{len(chain.bodies)} bodies from '{chain.name}' on are not simulated as an elastic rod: "
+        f"the joints of '{short.identity.key}' leave it no length"
+    )
+    return Diagnostic(Severity.WARNING, message, short.identity.mark, "move their pivots apart", "rod")
 
 
 def _finding_of_rod(rod: RodChain, bodies: Sequence[Body]) -> Diagnostic:

@@ -63,6 +63,8 @@ class Closures:
         self._ends: list[End] = []
         engine.motions.forget_all()
         for closure in engine.scene.closures:
+            if not moving_with(engine, self._trees_of(closure)):
+                continue  # nothing of it can be moved, by a projection as little as by a constraint
             if needs_link(engine.scene, closure):
                 self._hold_end(closure)
             elif not closure.free:
@@ -206,8 +208,13 @@ class Closures:
         inner, outer = (self._engine.place_of[body] for body in (closure.inner, closure.outer))
         rows = row, self._engine.motions.row(outer.tree, outer.link)
         frames = matrix_pose7(T_inner_end), matrix_pose7(T_outer_end)
-        trees = inner.tree, outer.tree
+        trees = self._trees_of(closure)
         self._ends.append(End(closure.joint, trees, moving_with(self._engine, trees), rows, frames, point))
+
+    def _trees_of(self, closure: Closure) -> tuple[int, int]:
+        """Trees of the bodies that a loop's joint joins."""
+        inner, outer = (self._engine.place_of[body] for body in (closure.inner, closure.outer))
+        return inner.tree, outer.tree
 
     def _chain(self, closure: Closure) -> Chain:
         joint = self._scene.joints[closure.joint]

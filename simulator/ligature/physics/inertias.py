@@ -17,23 +17,33 @@ Bullet (`btMultiBody::solveImatrix` and its joints) lets nothing turn whose mome
 2.2e-16: torques on it are lost. Measured by `tests/physics/test_inertias.py`.
 """
 
+MOST_RATIO = 1e7
+"""Largest principal moment of a moving body, over its smallest: that of a steel wire of 1 m and 0.6 mm is 1e6.
+
+From 1e9 on Bullet's trees diverge, since the smaller moment is lost in sums with the larger one.
+"""
+
 BALL = 0.01
 """Radius in metres of the ball whose moments a body gets that has none."""
 
 
 def inertia_of(body: Body) -> Array:
-    """Principal moments (3,) that Bullet can invert: its own, at least `LEAST_INERTIA`, or a ball's."""
+    """Principal moments (3,) that Bullet can invert: its own, at least `LEAST_INERTIA`, or a ball's.
+
+    None is more than `MOST_RATIO` times another.
+    """
     if body.mass <= 0.0:
         return np.zeros(3)
     ball = 0.4 * max(body.mass, 1e-6) * BALL**2
-    return np.where(body.inertia > 0.0, np.maximum(body.inertia, LEAST_INERTIA), ball)
+    moments = np.where(body.inertia > 0.0, np.maximum(body.inertia, LEAST_INERTIA), ball)
+    return np.minimum(moments, MOST_RATIO * moments.min())
 
 
 def findings(scene: Scene) -> list[Diagnostic]:
     """Moving bodies outside rods whose moments are replaced.
 
-    Moments that are too small are a warning. A body without any, which has neither shape nor ``inertia``, is a detail:
-    the simulator has to choose some.
+    Moments that are too small or too different are a warning. A body without any, which has neither shape nor
+    ``inertia``, is a detail: the simulator has to choose some.
     """
     found = []
     for body in scene.bodies:
@@ -45,11 +55,12 @@ def findings(scene: Scene) -> list[Diagnostic]:
             f"the principal moments of body '{body.identity.key}' are {_listed(body.inertia)} kg m²; "
             f"{_listed(used)} kg m² are simulated"
         )
-        hint = (
-            f"give 'inertia'; these are a ball's of {BALL * 100:g} cm radius"
-            if (body.inertia <= 0.0).any()
-            else f"moments below {LEAST_INERTIA:g} kg m² cannot be simulated"
-        )
+        if (body.inertia <= 0.0).any():
+            hint = f"give 'inertia'; these are a ball's of {BALL * 100:g} cm radius"
+        elif (used < body.inertia).any():
+            hint = f"moments above {MOST_RATIO:g} times the smallest cannot be simulated"
+        else:
+            hint = f"moments below {LEAST_INERTIA:g} kg m² cannot be simulated"
         severity = Severity.DEBUG if none else Severity.WARNING
         found.append(Diagnostic(severity, message, body.identity.mark, hint, "inertia"))
     return found
