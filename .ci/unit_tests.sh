@@ -6,7 +6,7 @@
 # when nothing runs beside them. Where Linux shares the processor among sessions first, those of the simulators under test
 # would count no more than the session of the three workers: that is a session of its own, of lower priority as a whole.
 set -u
-# hundreds of processes start, and each would compile all modules anew, which takes half of a start
+# hundreds of processes start, and each would compile all modules of a checkout anew
 unset PYTHONDONTWRITEBYTECODE
 python=$1
 shift

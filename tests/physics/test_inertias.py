@@ -108,8 +108,8 @@ LIMB = (
     "location: {{position: {{x: 0.07, y: 0, z: 0}}}}}}\n"
     "Lower: {{name: Lower, mass: 0.3, inertia: {{ix: 0.001, iy: 0.001, iz: 0.001}}, "
     "location: {{position: {{x: 0.14, y: 0, z: 0}}}}}}\n"
-    "Ball: {{name: Ball, type: p2p, parent: Wall, child: Upper, parent axis: {{x: 0, y: 0, z: 1}}, child axis: {{x: 0, y: 0, z: 1}}, parent pivot: {{x: 0, y: 0, z: 0}}, "
-    "child pivot: {{x: -0.07, y: 0, z: 0}}}}\n"
+    "Ball: {{name: Ball, type: p2p, parent: Wall, child: Upper, parent axis: {{x: 0, y: 0, z: 1}}, "
+    "child axis: {{x: 0, y: 0, z: 1}}, parent pivot: {{x: 0, y: 0, z: 0}}, child pivot: {{x: -0.07, y: 0, z: 0}}}}\n"
     "Hinge: {{name: Hinge, type: revolute, parent: Upper, child: Lower, parent axis: {{x: 1, y: 2, z: 3}}, "
     "child axis: {{x: 1, y: 2, z: 3}}, parent pivot: {{x: 0.035, y: 0, z: 0}}, child pivot: {{x: -0.035, y: 0, z: 0}}}}\n"
 )

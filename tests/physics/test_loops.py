@@ -368,6 +368,7 @@ def test_two_bodies_may_have_two_joints_whether_they_move_or_not(
     file = tmp_path / "twice.yaml"
     file.write_text("\n".join(lines))
     simulation = ligature.Simulation(ligature.load(file))
+    assert len(simulation.scene.joints) == 2
     simulation.step(20)
     assert np.isfinite(simulation.state["body_pose"]).all()
     simulation.close()

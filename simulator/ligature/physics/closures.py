@@ -63,12 +63,13 @@ class Closures:
         self._ends: list[End] = []
         engine.motions.forget_all()
         for closure in engine.scene.closures:
-            if not moving_with(engine, self._trees_of(closure)):
+            mechanism = moving_with(engine, self._trees_of(closure))
+            if not mechanism:
                 continue  # nothing of it can be moved, by a projection as little as by a constraint
             if needs_link(engine.scene, closure):
-                self._hold_end(closure)
+                self._hold_end(closure, mechanism)
             elif not closure.free:
-                self._hold_point(closure)
+                self._hold_point(closure, mechanism)
         self._ends.sort(key=lambda end: end.mechanism)
         self._arrays = lay_out(engine, self._ends)
         self._table = table_of(self._arrays)
@@ -180,7 +181,7 @@ class Closures:
             )
         self._torn = torn
 
-    def _hold_end(self, closure: Closure) -> None:
+    def _hold_end(self, closure: Closure, mechanism: tuple[int, ...]) -> None:
         """Join the end of a closing joint to its outer body."""
         engine = self._engine
         inner, outer = engine.place_of[closure.inner], engine.place_of[closure.outer]
@@ -195,26 +196,34 @@ class Closures:
         T_outer_end = inverse(self._frame(closure.outer)) @ T_world_link @ T_link_end
         kind = pybullet.JOINT_POINT2POINT if point else pybullet.JOINT_FIXED
         self._create(kind, (tree.uid, link), (outer.uid, outer.link), T_link_end, T_outer_end)
-        self._watch(closure, row, T_link_end, T_outer_end, point)
+        self._watch(closure, mechanism, row, T_link_end, T_outer_end, point)
 
-    def _hold_point(self, closure: Closure) -> None:
+    def _hold_point(self, closure: Closure, mechanism: tuple[int, ...]) -> None:
         inner, outer = self._engine.place_of[closure.inner], self._engine.place_of[closure.outer]
         T_inner = self._chain(closure).T_inner
         T_outer_end = inverse(self._frame(closure.outer)) @ self._frame(closure.inner) @ T_inner
         self._create(pybullet.JOINT_POINT2POINT, (inner.uid, inner.link), (outer.uid, outer.link), T_inner, T_outer_end)
-        self._watch(closure, self._engine.motions.row(inner.tree, inner.link), T_inner, T_outer_end, True)
+        row = self._engine.motions.row(inner.tree, inner.link)
+        self._watch(closure, mechanism, row, T_inner, T_outer_end, True)
 
-    def _watch(self, closure: Closure, row: int, T_inner_end: Array, T_outer_end: Array, point: bool) -> None:
-        inner, outer = (self._engine.place_of[body] for body in (closure.inner, closure.outer))
+    def _watch(
+        self,
+        closure: Closure,
+        mechanism: tuple[int, ...],
+        row: int,
+        T_inner_end: Array,
+        T_outer_end: Array,
+        point: bool,
+    ) -> None:
+        outer = self._engine.place_of[closure.outer]
         rows = row, self._engine.motions.row(outer.tree, outer.link)
         frames = matrix_pose7(T_inner_end), matrix_pose7(T_outer_end)
-        trees = self._trees_of(closure)
-        self._ends.append(End(closure.joint, trees, moving_with(self._engine, trees), rows, frames, point))
+        self._ends.append(End(closure.joint, self._trees_of(closure), mechanism, rows, frames, point))
 
     def _trees_of(self, closure: Closure) -> tuple[int, int]:
         """Trees of the bodies that a loop's joint joins."""
-        inner, outer = (self._engine.place_of[body] for body in (closure.inner, closure.outer))
-        return inner.tree, outer.tree
+        place_of = self._engine.place_of
+        return place_of[closure.inner].tree, place_of[closure.outer].tree
 
     def _chain(self, closure: Closure) -> Chain:
         joint = self._scene.joints[closure.joint]
