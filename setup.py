@@ -5,6 +5,7 @@ source distribution carries the messages generated, so that a wheel is built fro
 """
 
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -37,7 +38,8 @@ class BuildWithBundle(build_py):
         if self.editable_mode or self.distribution.get_command_obj("bdist_wheel", create=False) is None:
             return
         for name in ("scenes", "examples"):
-            self.copy_tree(str(ROOT / name), str(Path(self.build_lib, "ligature", "bundled", name)))
+            target = Path(self.build_lib, "ligature", "bundled", name)
+            shutil.copytree(ROOT / name, target, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
         if MESSAGES.is_dir():
             self.copy_tree(str(MESSAGES), self.build_lib)
         else:
