@@ -7,6 +7,7 @@ from pathlib import Path
 import ligature
 import numpy as np
 import pytest
+import yaml
 from ligature import Simulation
 from ligature.adf import Severity
 from ligature.model.assembly import joint_coordinates
@@ -350,6 +351,35 @@ def test_a_loop_that_diverges_restarts_as_a_whole(tmp_path: Path) -> None:
     sim._world.write_state(sim.state)
     np.testing.assert_allclose(sim.state["body_pose"], start, atol=1e-9)
     assert gaps(sim).max() < 1e-6
+    sim.close()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_that_hangs_on_a_loop_turns_faster_than_bullet_allows(kind: str, tmp_path: Path) -> None:
+    """A light pendulum on a linkage is turned by a torque about its joint, which moves nothing of the loop itself."""
+    rng = np.random.default_rng((11, KINDS.index(kind)))
+    model = yaml.safe_load(linkage(rng, kind))
+    bar = model[next(key for key in model["bodies"] if model[key]["mass"] > 0)]
+    small = dict.fromkeys(("ix", "iy", "iz"), 1e-7)
+    model["P"] = {"name": "P", "mass": 1e-3, "inertia": small, "location": bar["location"]}
+    place, axis = dict.fromkeys("xyz", 0.0), {"x": 0.0, "y": 0.0, "z": 1.0}
+    sides = {
+        f"{side} {what}": value for side in ("parent", "child") for what, value in (("pivot", place), ("axis", axis))
+    }
+    model["JP"] = {"name": "JP", "parent": bar["name"], "child": "P", "type": "revolute", **sides}
+    model["bodies"].append("P")
+    model["joints"].append("JP")
+    sim = Simulation(scene_of(yaml.safe_dump(model, sort_keys=False), tmp_path))
+    fastest = 0.0
+    for torque in (1e-3, 0.1, 10.0):
+        for _ in range(20):
+            about = pose7_matrix(sim.bodies["P"].pose)[:3, 2]
+            sim.bodies["P"].command_wrench([0.0, 0.0, 0.0, *(torque * about)])
+            sim.step()
+            fastest = max(fastest, float(np.abs(sim.state["joint_velocity"]).max()))
+    assert 99.0 < fastest < 100.1
+    assert gaps(sim).max() < GAP
+    assert not [problem for problem in sim.problems if problem.code == "diverged"]
     sim.close()
 
 

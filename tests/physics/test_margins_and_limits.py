@@ -84,3 +84,23 @@ def test_limits_the_wrong_way_round_are_none(number: int, tmp_path: Path) -> Non
         assert reported == (limits is not far and bool(limits))
     np.testing.assert_allclose(*ends, atol=1e-6)
     assert moved > 1e-4 or kind == "revolute", kind
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "linear spring", "torsion spring"])
+@pytest.mark.parametrize("number", range(6))
+def test_limits_where_no_joint_can_be_are_reported_and_left_out(kind: str, number: int, tmp_path: Path) -> None:
+    """Both ends are on one side, farther than a body may be; a range that has its start within reach is taken."""
+    rng = random.Random(number)
+    far = rng.choice((-1, 1)) * 10.0 ** rng.uniform(4.1, 12.0)
+    near = 0.0 if number % 2 else far
+    low, high = sorted((near, far * rng.uniform(1.0, 2.0)))
+    joint = {"name": "j", "type": kind, "parent": "base", "child": "link", **AXES, "stiffness": 1.0, "damping": 0.1}
+    bodies = {"base": {"name": "base", "mass": 0.0}, "link": {"name": "link", "mass": 0.2, **BALL}}
+    scene = loaded(tmp_path, **bodies, J={**joint, "joint limits": {"low": low, "high": high}})
+    found = [d for d in scene.diagnostics if "where it cannot be" in d.message]
+    assert [d.severity for d in found] == ([] if number % 2 else [Severity.WARNING])
+    assert (scene.joints[0].low is None) == bool(found)
+    simulation = ligature.Simulation(scene)
+    simulation.step(20)
+    assert np.abs(simulation.state["body_pose"][0, :, :3]).max() < 10.0
+    simulation.close()

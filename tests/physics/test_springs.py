@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import ligature
@@ -17,7 +19,7 @@ import yaml
 from ligature.adf import Severity
 from ligature.adf.frames import axis_rotation, matrix_rpy
 from ligature.cli.check import findings
-from ligature.model.frames import rpy_matrix
+from ligature.model.frames import pose7_matrix, rpy_matrix
 from ligature.physics.guard import MAX_SPEED
 
 LINEAR = ("linear spring", "six dof spring")
@@ -261,6 +263,47 @@ def test_a_body_on_springs_along_and_about_many_axes_falls_no_faster_than_withou
         speed = float(np.linalg.norm(simulation.state["body_twist"][0, :, :3], axis=1).max())
         assert speed < 9.8e-3 * tick + 0.5, f"{speed:.3g} m/s after {tick} ms"
     simulation.close()
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_springs_and_dampers_give_no_energy_where_two_of_three_axes_become_parallel(seed: int, tmp_path: Path) -> None:
+    """A body is let go with the middle axis 0 to 40° from gimbal lock, its springs stretched, its dampers of any number."""
+    rng = np.random.default_rng((5, seed))
+    mass = 10.0 ** float(rng.uniform(-3, 0))
+    inertia = mass * rng.uniform(0.03, 0.06, 3) ** 2
+    turns = np.array([rng.uniform(-1, 1), rng.choice((-1, 1)) * rng.uniform(0.87, 1.57), rng.uniform(-1, 1)])
+    stiffness = inertia.mean() * (2 * np.pi * rng.uniform(0.0, 5.0, 3)) ** 2
+    damping = inertia.mean() * 10.0 ** rng.uniform(0, 4, 3)
+    xyz = partial(zip, "xyz", strict=True)
+    zero, free = dict.fromkeys("xyz", 0.0), {"low": dict.fromkeys("xyz", 1.0), "high": dict.fromkeys("xyz", -1.0)}
+    body = {"damping": {"linear": 0.0, "angular": 0.0}, "inertial offset": {}}
+    up = {"x": 0.0, "y": 0.0, "z": 1.0}
+    file = tmp_path / "m.yaml"
+    file.write_text(
+        yaml.safe_dump(
+            {
+                "bodies": ["A", "B"], "joints": ["J"], "gravity": zero,
+                "A": {"name": "A", "mass": 0},
+                "B": {"name": "B", "mass": mass, "inertia": dict(zip(("ix", "iy", "iz"), inertia.tolist(), strict=True)),
+                      "location": {"orientation": dict(zip("rpy", turns.tolist(), strict=True))}, **body},
+                "J": {"name": "J", "type": "six dof spring", "parent": "A", "child": "B",
+                      "parent pivot": zero, "child pivot": zero, "parent axis": up, "child axis": up,
+                      "joint limits": {"linear": {"low": zero, "high": zero}, "angular": free},
+                      "stiffness": {"linear": zero, "angular": dict(xyz(stiffness.tolist()))},
+                      "damping": {"linear": zero, "angular": dict(xyz(damping.tolist()))}},
+            }
+        )
+    )  # fmt: skip
+    with closing(ligature.Simulation(ligature.load(file))) as simulation:
+        stretched = 0.5 * float(stiffness @ turns**2)
+        most = 0.0
+        for _ in range(400):
+            simulation.step()
+            pose, twist = simulation.state["body_pose"][0, 1], simulation.state["body_twist"][0, 1]
+            omega = pose7_matrix(pose)[:3, :3].T @ twist[3:]
+            most = max(most, 0.5 * float(inertia @ omega**2 + mass * twist[:3] @ twist[:3]))
+        assert not simulation.problems
+        assert most < 1.05 * stretched, f"{most / stretched:.3g} of the energy of the springs"
 
 
 def _hung(unit: float, number: int) -> str:

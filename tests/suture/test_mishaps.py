@@ -85,6 +85,39 @@ def test_thread_that_starts_inside_a_hull_comes_out(tmp_path):
     assert sim.problems == []
 
 
+@pytest.mark.parametrize("seed", range(16))
+def test_thread_that_starts_in_the_middle_of_a_thin_body_leaves_both_slow(seed, tmp_path):
+    """A light body 0.6 to 2 mm thick, of any shape and pose, with a thread along any direction that it may hold."""
+    rng = np.random.default_rng((7, seed))
+    half, long = float(rng.uniform(3e-4, 1e-3)), float(rng.uniform(4e-3, 2e-2))
+    kind = ("CAPSULE", "CYLINDER", "BOX", "CONE")[seed % 4]
+    round_ = {"radius": half, "height": long, "axis": "Z"}
+    body = {
+        "name": "body", "mass": 10.0 ** float(rng.uniform(-5, -3)), "gravity": {"x": 0, "y": 0, "z": 0},
+        "collision shape": kind,
+        "collision geometry": {"x": 2 * half, "y": 2 * half, "z": long} if kind == "BOX" else round_,
+        "location": {"position": dict(zip("xyz", rng.uniform(-1, 1, 3).tolist(), strict=True)),
+                     "orientation": dict(zip("rpy", rng.uniform(-1, 1, 3).tolist(), strict=True))},
+    }  # fmt: skip
+    place = rng.uniform(-0.2, 0.2) * long
+    thread = {
+        "name": "thread", "length": 0.02, "diameter": 3e-4, "elements": 30, "parent": "BODY body",
+        "location": {"position": {"x": 0.0, "y": 0.0, "z": place},
+                     "orientation": {"r": float(rng.choice((0.0, 0.05, 1.5708))), "p": 0.0, "y": 0.0}},
+    }  # fmt: skip
+    model = {"bodies": ["BODY body"], "BODY body": body, "sutures": ["SUTURE thread"], "SUTURE thread": thread}
+    file = tmp_path / "thin.yaml"
+    file.write_text(yaml.safe_dump({"gravity": {"x": 0, "y": 0, "z": 0}, **model}, sort_keys=False))
+    sim = ligature.Simulation(ligature.load(file))
+    try:
+        for _ in range(100):
+            sim.step()
+            assert np.abs(sim.state["body_twist"][0, :, :3]).max() < 1.0
+        assert sim.problems == []
+    finally:
+        sim.close()
+
+
 def test_thread_without_length_is_left_out_with_the_reason(tmp_path):
     model = {
         "bodies": ["BODY block"], "BODY block": {"name": "block", "mass": 0.0, "mesh": ""},

@@ -13,6 +13,7 @@ from ligature.adf.diagnostics import Diagnostic, Severity
 from ligature.adf.document import Element
 from ligature.adf.nodes import Mapping, Node, Scalar, Sequence
 from ligature.adf.schema import CLIPPING, SHAPE_KEYS
+from ligature.adf.schema.keys import FARTHEST
 
 Rule = Callable[[Element], Iterator[Diagnostic]]
 
@@ -146,6 +147,9 @@ def joint_limits(element: Element) -> Iterator[Diagnostic]:
         if low > high:
             message = f"has the limits {low:g} to {high:g}, so it is unlimited"
             yield _finding(element, Severity.WARNING, "joint limits", message, "set low to at most high")
+        elif low > FARTHEST or high < -FARTHEST:
+            message = f"has the limits {low:g} to {high:g}, where it cannot be; they are left out"
+            yield _finding(element, Severity.WARNING, "joint limits", message, f"set them within {FARTHEST:g}")
     if kind in _SPRINGS and not (has_low and has_high):
         hint = "set joint limits: {low, high}"
         yield _finding(element, Severity.WARNING, "type", f"is a {kind} without limits, which locks it", hint)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ligature.adf import Element, scalars
+from ligature.adf.schema.keys import FARTHEST
 from ligature.model.frames import Array, inverse, joint_frames
 from ligature.model.scene import Body, Gains, Identity, Joint, JointType, OutputType, SixDof
 
@@ -81,9 +82,11 @@ def _motor(value: Any) -> bool:
 
 
 def _span(element: Element) -> tuple[float, float] | None:
-    """The ends of the limits as the file gives them; None unless it gives both."""
+    """The ends of the limits as the file gives them; None unless it gives both, and the joint can be between them."""
     low, high = element.value("joint limits.low"), element.value("joint limits.high")
-    return None if low is None or high is None else (float(low), float(high))
+    if low is None or high is None or FARTHEST < low <= high or low <= high < -FARTHEST:
+        return None
+    return float(low), float(high)
 
 
 def _limits(element: Element, kind: JointType) -> tuple[float | None, float | None]:

@@ -19,8 +19,8 @@ from ligature.model.scene import Body, Joint, JointType, RodChain, Sensor, Senso
 from ligature.model.shapes import Capsule, Cylinder, Sphere
 
 LEAST_ELEMENTS = 4
-LEAST_LENGTH = 1e-3
-"""Length of a rod's element over its radius; a chain with a shorter one stays bodies."""
+LEAST_LENGTH, MOST_LENGTH = 1e-3, 1e4
+"""Length of a rod's element over its radius; a chain with a shorter or a longer one stays bodies."""
 
 
 def find_rods(
@@ -31,11 +31,15 @@ def find_rods(
     ``opted_out`` are bodies that must stay bodies.
     """
     chains = _chains(bodies, joints, opted_out)
-    rods, between = _without_joints_between([chain for chain in chains if _short(chain) is None], joints)
+    rods, between = _without_joints_between([chain for chain in chains if _misshapen(chain) is None], joints)
     moved, findings = _joined(rods, bodies, joints)
     placed = [replace(b, T_world_body=moved[b.index]) if b.index in moved else b for b in bodies]
     findings += [_finding_of_joint(joint) for joint in between]
-    findings += [_finding_of_length(chain, bodies[short]) for chain in chains if (short := _short(chain)) is not None]
+    findings += [
+        _finding_of_length(chain, element, bodies[chain.bodies[element]])
+        for chain in chains
+        if (element := _misshapen(chain)) is not None
+    ]
     elements = {body for rod in rods for body in rod.bodies}
     findings += [
         _finding_of_sensor(sensor)
@@ -59,18 +63,23 @@ def _finding_of_sensor(sensor: Sensor) -> Diagnostic:
     return Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "rod")
 
 
-def _short(chain: RodChain) -> int | None:
-    """The first body of a chain that is too short for an element."""
-    short = np.flatnonzero(chain.lengths < LEAST_LENGTH * chain.radius)
-    return chain.bodies[short[0]] if len(short) else None
+def _misshapen(chain: RodChain) -> int | None:
+    """Which element of a chain, the first of them, is too short or too long for a rod."""
+    slender = chain.lengths / chain.radius
+    found = np.flatnonzero((slender < LEAST_LENGTH) | (slender > MOST_LENGTH))
+    return int(found[0]) if len(found) else None
 
 
-def _finding_of_length(chain: RodChain, short: Body) -> Diagnostic:
+def _finding_of_length(chain: RodChain, element: int, body: Body) -> Diagnostic:
+    """Finding for a chain that stays bodies for the length of one ``element``."""
+    long = chain.lengths[element] > chain.radius
     message = (
         f"{len(chain.bodies)} bodies from '{chain.name}' on are not simulated as an elastic rod: "
-        f"the joints of '{short.identity.key}' leave it no length"
+        f"the joints of '{body.identity.key}' "
+        + (f"make it {length(chain.lengths[element])} long" if long else "leave it no length")
     )
-    return Diagnostic(Severity.WARNING, message, short.identity.mark, "move their pivots apart", "rod")
+    hint = f"move their pivots {'together' if long else 'apart'}"
+    return Diagnostic(Severity.WARNING, message, body.identity.mark, hint, "rod")
 
 
 def _finding_of_rod(rod: RodChain, bodies: Sequence[Body]) -> Diagnostic:

@@ -85,6 +85,9 @@ class Axes(NamedTuple):
     stiffness: Array  # of springs
     damping: Array
     rest: Array
+    middle: Integers  # how many axes on the middle one of three turning axes is, for the two others; else 0
+    most_stiffness: Array  # that ticks bear while the middle axis stands at zero
+    most_damping: Array
     target: Array
     pace: Array  # of the target
     max_velocity: Array
@@ -105,7 +108,7 @@ class Axes(NamedTuple):
 
 
 _KINDS = {
-    **dict.fromkeys(("mode", "kick_ticks"), np.int64),
+    **dict.fromkeys(("mode", "kick_ticks", "middle"), np.int64),
     **dict.fromkeys(("force_output", "turns", "sprung", "owned", "driven", "pushed", "stopped", "slowed"), np.bool_),
 }
 """Kinds of the arrays that do not hold real numbers."""
@@ -203,7 +206,23 @@ def _follow_law(axes: Axes, trees: Trees, k: int, dt: float) -> None:
     elif axes.mode[k] == FORCE:
         trees.push[k] = axes.target[k]
     if axes.sprung[k]:
-        trees.push[k] += axes.stiffness[k] * (axes.rest[k] - position) - axes.damping[k] * velocity
+        stiffness, damping = _bearable(axes, trees, k)
+        trees.push[k] += stiffness * (axes.rest[k] - position) - damping * velocity
+
+
+@inlined
+def _bearable(axes: Axes, trees: Trees, k: int) -> tuple[float, float]:
+    """Stiffness and damping of one axis, no more than ticks bear.
+
+    Where the middle one of three turning axes stands at an angle a, the others are 90° - a from being parallel. Then
+    either of them moves cos² a of the inertia that it moves at zero, for the other gives way.
+    """
+    stiffness, damping = axes.stiffness[k], axes.damping[k]
+    if axes.middle[k] != 0:
+        part = np.cos(trees.joints[0, k + axes.middle[k]]) ** 2
+        stiffness = min(stiffness, part * axes.most_stiffness[k])
+        damping = min(damping, part * axes.most_damping[k])
+    return stiffness, damping
 
 
 @inlined
@@ -211,8 +230,9 @@ def _balance(axes: Axes, trees: Trees, k: int) -> None:
     """Take the effort of a sprung axis that stands as none where its spring bears the weight; see `RESIDUE`."""
     velocity = trees.joints[1, k]
     if abs(velocity) < REST_SPEED:
-        spring = axes.stiffness[k] * abs(axes.rest[k] - trees.joints[0, k])
-        if abs(trees.push[k] + axes.damping[k] * velocity) <= RESIDUE * max(min(1.0, axes.stiffness[k]), spring):
+        stiffness, damping = _bearable(axes, trees, k)
+        spring = stiffness * abs(axes.rest[k] - trees.joints[0, k])
+        if abs(trees.push[k] + damping * velocity) <= RESIDUE * max(min(1.0, stiffness), spring):
             trees.push[k] = 0.0
 
 

@@ -20,6 +20,7 @@ from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, pose
 from ligature.model.mechanism import Chain, chain_of
 from ligature.model.scene import Closure
 from ligature.physics.articulation import is_point, needs_link
+from ligature.physics.divergence import MAX_SPEED
 from ligature.physics.engine import CLOSING, Engine
 from ligature.physics.linkage import End, lay_out, moving_with
 from ligature.physics.projection import MOVED, close_loops, measure_loops
@@ -45,8 +46,11 @@ TORN_DAMPING = (8.0, 1.0)
 OPEN = 1e-4
 """Gap in metres from which on an open loop is reported."""
 
-UNBOUNDED = 1e6
-"""Speed in rad/s or m/s of a coordinate that Bullet allows: it would stop one link at 100, and tear its loop open."""
+UNBOUNDED = 0.5 * MAX_SPEED
+"""Speed in rad/s or m/s of a coordinate that Bullet allows: it would stop one link at 100, and tear its loop open.
+
+The projection bounds what is faster; no torque that a client commands makes a tree diverge before that.
+"""
 
 STUCK = 1e-3
 """Distance (rad, m) of a joint from its limit at which the limit is what holds a loop open."""

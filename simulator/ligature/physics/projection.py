@@ -25,7 +25,7 @@ from ligature.kernels import inlined, kernel
 from ligature.physics.loop_arrays import Integers, Loops, open_loops
 from ligature.physics.loop_matrices import FLAT, prepare
 from ligature.physics.loop_motion import gather, link, measure, move_by, scatter, send
-from ligature.physics.loop_solver import correct_speeds, find_step, product
+from ligature.physics.loop_solver import MAX_SPEED, SLACK, correct_speeds, find_step, product
 from ligature.physics.trees import Trees, open_trees, read_tree
 
 CLOSED = 1e-6
@@ -78,7 +78,7 @@ def measure_loops(tree_table: Integers, loop_table: Integers) -> float:
 
 @kernel
 def close_loops(handle: int, tree_table: Integers, loop_table: Integers, most: float, dt: float) -> float:
-    """Project all mechanisms whose loops are open; the widest gap that is left, in metres.
+    """Project all mechanisms whose loops are open, or that are too fast; the widest gap that is left, in metres.
 
     Where a gap is wider than `TORN`, ``most`` metres of it are closed. With a handle, the result is set in Bullet;
     otherwise the caller does so, for the mechanisms that `Loops.moved` states. Trees must be up to date, except their
@@ -90,7 +90,7 @@ def close_loops(handle: int, tree_table: Integers, loop_table: Integers, most: f
         link(trees, loops, m)
         widest = measure(trees, loops, m)
         loops.moved[m] = UNMOVED
-        if widest > CLOSED:
+        if widest > CLOSED or _too_fast(trees, loops, m):
             loops.moved[m] = MOVED if _project(trees, loops, m, widest, most, dt) else FAILED
             for t in range(loops.tree_begin[m], loops.tree_begin[m + 1]):
                 k = loops.tree[t]
@@ -102,6 +102,16 @@ def close_loops(handle: int, tree_table: Integers, loop_table: Integers, most: f
         for c in range(loops.begin[m], loops.begin[m + 1]):
             left = max(left, loops.gap[c])
     return left
+
+
+@inlined
+def _too_fast(trees: Trees, loops: Loops, m: int) -> bool:
+    """Whether a coordinate of mechanism ``m`` exceeds `MAX_SPEED`, which Bullet does not see to where there are loops."""
+    gather(trees, loops, m)
+    fastest = 0.0
+    for a in range(loops.size[m]):
+        fastest = max(fastest, abs(loops.speed[a]))
+    return fastest > (1.0 + SLACK) * MAX_SPEED
 
 
 @kernel

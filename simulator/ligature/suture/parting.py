@@ -38,6 +38,9 @@ TOO_DEEP = 1e-3
 Only what was put somewhere is asked: contacts over sharp edges sink by 2 mm, and hold.
 """
 
+HALFWAY = 0.5
+"""Depth of an element's axis over that of a part's middle which counts as `TOO_DEEP` too: in a thin part nothing is."""
+
 BESIDE = 3
 """Elements beside one that is inside a body that do not collide with it either: they would hold back what leaves."""
 
@@ -86,6 +89,22 @@ def _is_inside(rod: RodArrays, c: int, e: int, normal: Array) -> bool:
 
 
 @inlined
+def _middle(rod: RodArrays, c: int, normal: Array) -> float:
+    """How deep the middle of part ``c`` is in it."""
+    shapes, work = rod.shapes, rod.work
+    box, pose, turned, p = shapes.box[c], shapes.pose[c], work.R[rod.nodes.x.shape[0]], work.three[0]
+    matrix_of(pose[3], pose[4], pose[5], pose[6], turned)
+    p[0], p[1], p[2] = rotate_back(
+        turned,
+        0.5 * (box[0, 0] + box[1, 0]) - pose[0],
+        0.5 * (box[0, 1] + box[1, 1]) - pose[1],
+        0.5 * (box[0, 2] + box[1, 2]) - pose[2],
+    )
+    planes = shapes.planes[shapes.plane_range[c, 0] : shapes.plane_range[c, 1]]
+    return -signed_distance(shapes.kind[c], shapes.size[c], planes, p, normal)
+
+
+@inlined
 def _beside(inside: Flags, c: int, e: int) -> bool:
     """Whether element ``e`` is beside one that is inside part ``c``."""
     beside = False
@@ -102,8 +121,10 @@ def find_inside(rod_table: Integers, parts: Flags, inside: Flags) -> None:
     for c in range(parts.shape[0]):
         deep = False
         if parts[c] and shapes.node[c] >= 0:
+            middle = _middle(rod, c, normal)
+            limit = min(TOO_DEEP, HALFWAY * middle) if middle > 0.0 else TOO_DEEP
             for e in range(inside.shape[1]):
-                deep = deep or (not shapes.skip[c, e] and _depth_if_near(rod, c, e, normal) > TOO_DEEP)
+                deep = deep or (not shapes.skip[c, e] and _depth_if_near(rod, c, e, normal) > limit)
         if deep:
             for e in range(inside.shape[1]):
                 inside[c, e] = inside[c, e] or (not shapes.skip[c, e] and _is_inside(rod, c, e, normal))
