@@ -211,6 +211,7 @@ CACHES: dict[str, str] = {
             f"Loops.{name}"
             for name in (
                 "gap",
+                "most",
                 "moved",
                 "end",
                 "error",

@@ -86,9 +86,15 @@ def test_the_axis_of_a_symmetric_needle_goes_round_its_momentum(size: float, rat
     [
         ((1e-12, 1e-12, 1e-12), (1e-12, 1e-12, 1e-12), ""),
         ((3e-17, 1e-12, 1e-12), (LEAST_INERTIA, 1e-12, 1e-12), "moments below 1e-15 kg m² cannot be simulated"),
-        ((0.0, 1e-12, 1e-12), (4e-11, 1e-12, 1e-12), "give 'inertia'; these are a ball's of 1 cm radius"),
-        ((1e12, 1e-4, 2e-4), (1e3, 1e-4, 2e-4), "moments above 1e+07 times the smallest cannot be simulated"),
-    ],
+        ((0.0, 1e-12, 1e-11), (4e-11, 1e-12, 1e-11), "give 'inertia'; these are a ball's of 1 cm radius"),
+        ((1e-3, 1e-12, 2e-3), (1e-5, 1e-12, 1e-5), "moments above 1e+07 times the smallest cannot be simulated"),
+        (
+            (1e12, 1e-4, 2e-4),
+            (3e-3, 1e-4, 2e-4),
+            "no body has a moment above the sum of the others; at most 10 times that is simulated",
+        ),
+        ((2e-3, 1e-3, 1e-4), (2e-3, 1e-3, 1e-4), ""),
+    ],  # fmt: skip
 )
 def test_moments_that_are_replaced_are_reported(
     own: Moments, used: Moments, text: str, simulate: Make, tmp_path: Path
@@ -130,4 +136,20 @@ def test_bodies_with_any_moments_swing_no_faster_than_they_fall(
         assert np.isfinite(simulation.state["body_pose"]).all()
         assert np.linalg.norm(simulation.state["body_twist"][0, :, :3], axis=1).max() < 5.0
     assert not [problem for problem in simulation.problems if problem.code == "diverged"]
+    simulation.close()
+
+
+@given(least=st.floats(-6.0, -3.0).map(lambda e: 10.0**e), excess=st.floats(1.0, 10.0).map(lambda e: 10.0**e))
+@ONCE
+def test_what_hangs_on_a_body_that_no_real_one_is_like_turns_no_faster_than_it_is_pushed(
+    least: float, excess: float, simulate: Make
+) -> None:
+    """The largest moment of the upper body exceeds the sum of the others."""
+    simulation = simulate(LIMB.format(excess * least, least, least, gravity=-9.81))
+    simulation.bodies["Lower"].command_wrench([0.0, 0.0, 0.0, 0.02, 0.03, 0.04])
+    simulation.step(100)
+    simulation.bodies["Lower"].command_wrench([0.0] * 6)
+    for _ in range(40):
+        simulation.step(25)
+        assert np.linalg.norm(simulation.state["body_twist"][0, :, :3], axis=1).max() < 5.0
     simulation.close()

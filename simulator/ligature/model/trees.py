@@ -17,6 +17,9 @@ MOST_LINKS = 120
 MAX_LINKS = 112
 """Links of the joints that a tree holds; the others are for closing joints."""
 
+LIGHT = 0.5
+"""Mass of a body over that of the heaviest one of its tree up to which that one is the root instead."""
+
 
 @dataclass
 class _Below:
@@ -76,10 +79,28 @@ def articulations(
     trees = []
     for root in order:
         if root.index not in placed:
-            trees.append(_tree(root.index, bodies, edges, placed, used))
+            trees.append(_tree(_root(root.index, bodies, edges, placed), bodies, edges, placed, used))
     trees.sort(key=lambda tree: min(link.body for link in tree.links))
     loops = [j.index for j in joints if j.index not in used and j.index not in rod_joints]
     return tuple(trees), tuple(loops)
+
+
+def _root(first: int, bodies: Sequence[Body], edges: dict[int, list[Joint]], placed: set[int]) -> int:
+    """The root of the tree that ``first`` is in: itself, or the heaviest body where it is no more than `LIGHT` of that.
+
+    A heavy body that hangs on a light one moves by coordinates that are large and nearly cancel.
+    """
+    if bodies[first].static:
+        return first
+    found, seen = [first], {first, *placed}
+    for body in found:
+        for joint in edges.get(body, ()):
+            other = joint.child if joint.parent == body else joint.parent
+            if other not in seen and not bodies[other].static:
+                seen.add(other)
+                found.append(other)
+    heaviest = max(found, key=lambda body: (bodies[body].mass, -body))
+    return first if bodies[first].mass > LIGHT * bodies[heaviest].mass else heaviest
 
 
 def _tree(

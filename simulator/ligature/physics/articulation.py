@@ -166,6 +166,20 @@ class Tree:
             pybullet.resetJointState(self.uid, link, position, 0.0, physicsClientId=client)
 
     @property
+    def ways_to_middle(self) -> list[int]:
+        """For every axis, how many axes on the middle one of three turning axes is; 0 but for the two others."""
+        ways = [0] * len(self.axes)
+        turning: dict[int, list[int]] = {}
+        for row, (_, joint, axis, _) in enumerate(self.axes):
+            if not axis.prismatic:
+                turning.setdefault(joint, []).append(row)
+        for rows in turning.values():
+            if len(rows) >= 3:
+                outer, middle, inner = rows[-3:]
+                ways[outer], ways[inner] = middle - outer, middle - inner
+        return ways
+
+    @property
     def bases(self) -> tuple[int, ...]:
         """The ids that move when the root is put elsewhere."""
         return (self.uid,) if self.stand == self.uid else (self.stand, self.uid)

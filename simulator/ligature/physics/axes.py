@@ -30,7 +30,16 @@ from ligature.physics.bullet import (
     set_velocity,
     submit,
 )
-from ligature.physics.trees import BASE_U, REST_SPEED, Trees, follow, load_joints, open_trees, read_tree
+from ligature.physics.trees import (
+    BASE_U,
+    REST_SPEED,
+    Trees,
+    follow,
+    load_joints,
+    open_trees,
+    part_moved,
+    read_tree,
+)
 from ligature.tables import opener
 
 Array = NDArray[np.float64]
@@ -85,7 +94,6 @@ class Axes(NamedTuple):
     stiffness: Array  # of springs
     damping: Array
     rest: Array
-    middle: Integers  # how many axes on the middle one of three turning axes is, for the two others; else 0
     most_stiffness: Array  # that ticks bear while the middle axis stands at zero
     most_damping: Array
     target: Array
@@ -108,7 +116,7 @@ class Axes(NamedTuple):
 
 
 _KINDS = {
-    **dict.fromkeys(("mode", "kick_ticks", "middle"), np.int64),
+    **dict.fromkeys(("mode", "kick_ticks"), np.int64),
     **dict.fromkeys(("force_output", "turns", "sprung", "owned", "driven", "pushed", "stopped", "slowed"), np.bool_),
 }
 """Kinds of the arrays that do not hold real numbers."""
@@ -214,12 +222,12 @@ def _follow_law(axes: Axes, trees: Trees, k: int, dt: float) -> None:
 def _bearable(axes: Axes, trees: Trees, k: int) -> tuple[float, float]:
     """Stiffness and damping of one axis, no more than ticks bear.
 
-    Where the middle one of three turning axes stands at an angle a, the others are 90° - a from being parallel. Then
-    either of them moves cos² a of the inertia that it moves at zero, for the other gives way.
+    Where two of three turning axes are near parallel, either of them moves `part_moved` of the inertia that it moves
+    where they are square, for the other gives way.
     """
     stiffness, damping = axes.stiffness[k], axes.damping[k]
-    if axes.middle[k] != 0:
-        part = np.cos(trees.joints[0, k + axes.middle[k]]) ** 2
+    if trees.middle[k] != 0:
+        part = part_moved(trees, k)
         stiffness = min(stiffness, part * axes.most_stiffness[k])
         damping = min(damping, part * axes.most_damping[k])
     return stiffness, damping

@@ -20,7 +20,6 @@ from ligature.model.frames import inverse, matrix_pose7, matrix_quaternion, pose
 from ligature.model.mechanism import Chain, chain_of
 from ligature.model.scene import Closure
 from ligature.physics.articulation import is_point, needs_link
-from ligature.physics.divergence import MAX_SPEED
 from ligature.physics.engine import CLOSING, Engine
 from ligature.physics.linkage import End, lay_out, moving_with
 from ligature.physics.projection import MOVED, close_loops, measure_loops
@@ -46,10 +45,11 @@ TORN_DAMPING = (8.0, 1.0)
 OPEN = 1e-4
 """Gap in metres from which on an open loop is reported."""
 
-UNBOUNDED = 0.5 * MAX_SPEED
-"""Speed in rad/s or m/s of a coordinate that Bullet allows: it would stop one link at 100, and tear its loop open.
+UNBOUNDED = 500.0
+"""Speed in rad/s or m/s of a coordinate that Bullet allows, so that no torque which is commanded makes a tree diverge.
 
-The projection bounds what is faster; no torque that a client commands makes a tree diverge before that.
+Bullet stops a link at 100 whatever hangs on it. That tears loops open, and where coordinates of a light link and of a
+heavy one on it nearly cancel, it throws the heavy one. The projection slows them down together.
 """
 
 STUCK = 1e-3
@@ -57,7 +57,10 @@ STUCK = 1e-3
 
 
 class Closures:
-    """What closes the loops of a scene: constraints, made where it starts, and a projection after each tick."""
+    """What closes the loops of a scene: constraints, made where it starts, and a projection after each tick.
+
+    The projection also slows down trees that are too fast.
+    """
 
     def __init__(self, engine: Engine) -> None:
         self._engine, self._client, self._scene = engine, engine.client, engine.scene
@@ -77,10 +80,9 @@ class Closures:
         self._ends.sort(key=lambda end: end.mechanism)
         self._arrays = lay_out(engine, self._ends)
         self._table = table_of(self._arrays)
-        looped = sorted({tree for end in self._ends for tree in end.mechanism})
-        for tree in looped:
-            uid = engine.trees[tree].uid
-            pybullet.changeDynamics(uid, -1, maxJointVelocity=UNBOUNDED, physicsClientId=self._client)
+        for tree in engine.trees:
+            if tree.axes:
+                pybullet.changeDynamics(tree.uid, -1, maxJointVelocity=UNBOUNDED, physicsClientId=self._client)
 
     def pace(self) -> None:
         """Have the coming tick close gaps by no more than `PACE` allows, and damp loops that come apart.
@@ -99,9 +101,12 @@ class Closures:
         if torn != self._torn:
             self._damp(torn)
 
-    def project(self) -> list[Diagnostic]:
-        """After a tick, put mechanisms where their loops are closed; returns what is found open for the first time."""
-        if not self._ends:
+    def project(self, fast: bool) -> list[Diagnostic]:
+        """After a tick, put mechanisms where their loops are closed; returns what is found open for the first time.
+
+        ``fast`` is whether a coordinate of any tree exceeds `MAX_RATE`; such trees are slowed down.
+        """
+        if not (self._ends or fast):
             return []
         motions = self._engine.motions
         motions.prepare()

@@ -101,22 +101,8 @@ class TreeControl:
         own.most_damping[:] = MOST_DAMPED * moved / (crowd * self._dt)
         own.stiffness[:] = np.minimum([a.stiffness for a in axes], own.most_stiffness)
         own.damping[:] = np.minimum([a.damping for a in axes], own.most_damping)
-        own.middle[:] = self._ways_to_middle()
         own.rest[:] = [a.rest for a in axes]
         own.sprung[:] = [a.sprung for a in axes]
-
-    def _ways_to_middle(self) -> list[int]:
-        """`Axes.middle` of every axis."""
-        ways = [0] * len(self.links)
-        turning: dict[int, list[int]] = {}
-        for row, (_, joint, axis, _) in enumerate(self.tree.axes):
-            if not axis.prismatic:
-                turning.setdefault(joint, []).append(row)
-        for rows in turning.values():
-            if len(rows) >= 3:
-                outer, middle, inner = rows[-3:]
-                ways[outer], ways[inner] = middle - outer, middle - inner
-        return ways
 
     def _dampers_on_a_body(self, owners: list[Joint]) -> Array:
         """Number (n,) of sprung joints that share a body with that of each axis: their dampers act together."""

@@ -1,4 +1,4 @@
-"""Mechanisms as arrays for compiled code: trees that loops join, and where their ends meet."""
+"""Mechanisms as arrays for compiled code: trees that loops join, where their ends meet, and single trees."""
 
 from __future__ import annotations
 
@@ -39,9 +39,11 @@ def moving_with(engine: Engine, trees: Sequence[int]) -> tuple[int, ...]:
 
 
 def lay_out(engine: Engine, ends: Sequence[End]) -> Loops:
-    """The arrays of the mechanisms of ``ends``, which are sorted by mechanism."""
+    """The arrays of the mechanisms of ``ends``, which are sorted by mechanism, and of all other trees with joints."""
     groups = [(mechanism, list(members)) for mechanism, members in groupby(ends, key=lambda end: end.mechanism)]
     trees, motions = engine.trees, engine.motions
+    looped = {k for mechanism, _ in groups for k in mechanism}
+    groups += [((k,), []) for k, tree in enumerate(trees) if tree.axes and k not in looped]
     sizes = [sum(_coordinates(engine, k) for k in mechanism) for mechanism, _ in groups]
     most = max(sizes, default=1), max((len(members) for _, members in groups), default=1)
     count = sum(len(mechanism) for mechanism, _ in groups)
@@ -50,7 +52,7 @@ def lay_out(engine: Engine, ends: Sequence[End]) -> Loops:
     arrays.tree_begin[1:] = np.cumsum([len(mechanism) for mechanism, _ in groups])
     arrays.begin[1:] = np.cumsum([len(members) for _, members in groups])
     arrays.size[:] = sizes
-    arrays.extent[:] = [_extent(engine, members) for _, members in groups]
+    arrays.extent[:] = [_extent(engine, mechanism) for mechanism, _ in groups]
     arrays.low[:] = [-np.inf if axis.low is None else axis.low for tree in trees for _, _, axis, _ in tree.axes]
     arrays.high[:] = [np.inf if axis.high is None else axis.high for tree in trees for _, _, axis, _ in tree.axes]
     for mechanism, _ in groups:
@@ -72,11 +74,11 @@ def _coordinates(engine: Engine, tree: int) -> int:
     return len(engine.trees[tree].axes) + (0 if engine.trees[tree].static else 6)
 
 
-def _extent(engine: Engine, ends: Sequence[End]) -> float:
+def _extent(engine: Engine, mechanism: Sequence[int]) -> float:
     """Extent in metres of a mechanism as it stands now: of its joints and bodies."""
     motions = engine.motions
     rows = []
-    for k in {tree for end in ends for tree in end.mechanism}:
+    for k in mechanism:
         motions.links(k)
         rows += list(range(motions.row(k, -1), motions.row(k, len(engine.trees[k].frames))))
     places = np.concatenate([motions.trees.frame[rows, :3], motions.pose[rows, :3]])

@@ -54,6 +54,7 @@ class Loops(NamedTuple):
     place: Array  # (n,) coordinates of axes
     bound: Array  # (n, 2) limits of coordinates
     speed: Array  # (n,)
+    most: Array  # (n,) largest speeds
     wanted: Array  # (13 + 2 n,) what is on its way to Bullet
     wanted_at: Integers  # (1,) its address
 
@@ -70,7 +71,8 @@ def loops(mechanisms: int, trees: int, closures: int, rows: int, axes: int, most
         high=z(axes), gap=z(closures), moved=z(mechanisms, whole), end=z((2, 7)), error=z(k), inertia=z((rows, 10)),
         axis=z((n, 6)), first=z(n, whole), linear=z(n, no), M=z((n, n)), J=z((k, n)), row_of=z(k, whole),
         rank=z(1, whole), firm=z(1, whole), B=z((k, n)), scale=z(k), A=z((k, k)), multiplier=z(k), step=z(n),
-        shift=z(n), place=z(n), bound=z((n, 2)), speed=z(n), wanted=wanted, wanted_at=np.array([wanted.ctypes.data]),
+        shift=z(n), place=z(n), bound=z((n, 2)), speed=z(n), most=z(n), wanted=wanted,
+        wanted_at=np.array([wanted.ctypes.data]),
     )  # fmt: skip
 
 

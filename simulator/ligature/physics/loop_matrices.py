@@ -26,7 +26,8 @@ Other joints constrain it then, up to rounding errors: frames of joints are corr
 def prepare(trees: Trees, loops: Loops, m: int, rows: int) -> bool:
     """Mass matrix, Jacobian and their factors of mechanism ``m`` where it is; whether the factor exists."""
     n = loops.size[m]
-    origin = trees.pose[loops.end_row[loops.begin[m], 0]]
+    looped = loops.begin[m] < loops.begin[m + 1]
+    origin = trees.pose[loops.end_row[loops.begin[m], 0] if looped else trees.begin[loops.tree[loops.tree_begin[m]]]]
     ox, oy, oz = origin[0], origin[1], origin[2]
     for t in range(loops.tree_begin[m], loops.tree_begin[m + 1]):
         for r in range(trees.begin[loops.tree[t]], trees.begin[loops.tree[t] + 1]):

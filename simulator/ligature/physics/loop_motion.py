@@ -17,7 +17,7 @@ from ligature.physics.bullet import (
     submit,
 )
 from ligature.physics.loop_arrays import Loops
-from ligature.physics.trees import SLIDES, Trees, follow
+from ligature.physics.trees import MAX_RATE, SLIDES, Trees, follow, most_rate
 
 
 @inlined
@@ -71,13 +71,13 @@ def gather(trees: Trees, loops: Loops, m: int) -> None:
         for i in range(begin, begin + loops.width[base]):
             loops.first[i] = begin
             loops.place[i], loops.bound[i, 0], loops.bound[i, 1] = 0.0, -math.inf, math.inf
-            loops.speed[i] = trees.twist[base, i - begin]
+            loops.speed[i], loops.most[i] = trees.twist[base, i - begin], MAX_RATE
             loops.linear[i], loops.shift[i] = i - begin < 3, 0.0
         for a in range(trees.first[k], trees.first[k + 1]):
             i = begin + loops.width[base] + a - trees.first[k]
             loops.first[i] = begin
             loops.place[i], loops.bound[i, 0], loops.bound[i, 1] = trees.joints[0, a], loops.low[a], loops.high[a]
-            loops.speed[i] = trees.joints[1, a]
+            loops.speed[i], loops.most[i] = trees.joints[1, a], most_rate(trees, a)
             loops.linear[i], loops.shift[i] = False, 0.0
         for r in range(base + 1, trees.begin[k + 1]):
             if loops.width[r] == 1:

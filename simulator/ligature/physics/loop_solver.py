@@ -7,6 +7,7 @@ import math
 from ligature.kernels import inlined, kernel
 from ligature.physics.loop_arrays import Array, Loops
 from ligature.physics.loop_matrices import divide
+from ligature.physics.trees import SLACK
 
 WEAK = 1e-12
 """Squared length, in the metric of mass, below which a row of length 1 depends on those before it.
@@ -17,14 +18,8 @@ Links of grams that hold kilograms leave 1e-6 of a row.
 AT_LIMIT = 1e-6
 """Distance (m, rad) from its limit at which an axis does not move on."""
 
-SLACK = 1e-6
-"""Share by which a speed may exceed the maximum without another round."""
-
 SWEEPS = 3
 """Most rounds that search for axes which would pass their limits."""
-
-MAX_SPEED = 100.0
-"""Maximum speed of a coordinate in m/s or rad/s, that of Bullet; all that it moves slows down with it."""
 
 
 @inlined
@@ -108,7 +103,7 @@ def find_step(loops: Loops, n: int, rows: int, share: float) -> bool:
 
 @kernel
 def correct_speeds(loops: Loops, n: int, rows: int, dt: float) -> None:
-    """Remove from `speed` what opens loops, passes limits or exceeds `MAX_SPEED`; kinetic energy never grows.
+    """Remove from `speed` what opens loops, passes limits or exceeds `Loops.most`; kinetic energy never grows.
 
     If the projection reversed part of this tick's motion, of ``dt``, as in a flat place that rounding errors of the
     joints block, the speeds along it are removed too.
@@ -123,11 +118,11 @@ def correct_speeds(loops: Loops, n: int, rows: int, dt: float) -> None:
             stopped = (v[a] < 0.0 and loops.place[a] <= loops.bound[a, 0] + AT_LIMIT) or (
                 v[a] > 0.0 and loops.place[a] >= loops.bound[a, 1] - AT_LIMIT
             )
-            fast = abs(v[a]) > (1.0 + SLACK) * MAX_SPEED
+            fast = abs(v[a]) > SLACK * loops.most[a]
             if (fast or stopped) and sweep < SWEEPS and more + found < n:
                 row = rows + more + found
                 _keep(loops, n, rank + more + found, row, a)
-                loops.error[row] = 0.0 if stopped else math.copysign(MAX_SPEED, v[a])
+                loops.error[row] = 0.0 if stopped else math.copysign(loops.most[a], v[a])
                 found += 1
         if found == 0:
             break

@@ -54,6 +54,7 @@ class Motions:
         arrays.begin[:], arrays.first[:] = rows, axes
         arrays.going[:], arrays.turning[:] = [not tree.static for tree in trees], [bool(tree.axes) for tree in trees]
         arrays.link[:] = [link for tree in trees for link, *_ in tree.axes]
+        arrays.middle[:] = [way for tree in trees for way in tree.ways_to_middle]
         self._begin = rows.tolist()
         self.slices = [slice(a, b) for a, b in zip(axes[:-1].tolist(), axes[1:].tolist(), strict=True)]
         for k, tree in enumerate(trees):
@@ -111,7 +112,10 @@ class Motions:
     # --- the tick ---------------------------------------------------------------------------
 
     def step(self, limit: float) -> bool:
-        """Advance Bullet by a tick; whether the velocities of all bases and joints are finite and below ``limit``."""
+        """Advance Bullet by a tick; whether all velocities are finite and no larger than bodies may have.
+
+        That is ``limit`` for bodies without joints, `MAX_RATE` or less for coordinates of trees that have some.
+        """
         if self.handle:
             return bool(kernels.step_world(self.handle, self.table, limit))
         pybullet.stepSimulation(physicsClientId=self._client)
@@ -119,12 +123,12 @@ class Motions:
         self.read_all()
         for tree in range(len(self._uids)):
             if kernels.creeps_one(self.table, tree):
-                self._halt(tree)
+                self.halt(tree)
         self.trees.quiet[:] = True
         return bool(kernels.sound(self.table, limit))
 
-    def _halt(self, tree: int) -> None:
-        """Let the joints of a tree stand where they are."""
+    def halt(self, tree: int) -> None:
+        """Let the joints of a tree, which was read, stand where they are."""
         rows = self.slices[tree]
         self.velocity[rows] = 0.0
         for link, position in zip(self._links[tree], self.position[rows].tolist(), strict=True):

@@ -25,8 +25,8 @@ from ligature.kernels import inlined, kernel
 from ligature.physics.loop_arrays import Integers, Loops, open_loops
 from ligature.physics.loop_matrices import FLAT, prepare
 from ligature.physics.loop_motion import gather, link, measure, move_by, scatter, send
-from ligature.physics.loop_solver import MAX_SPEED, SLACK, correct_speeds, find_step, product
-from ligature.physics.trees import Trees, open_trees, read_tree
+from ligature.physics.loop_solver import correct_speeds, find_step, product
+from ligature.physics.trees import SLACK, Trees, open_trees, read_tree
 
 CLOSED = 1e-6
 """Gap (m, rad) up to which a loop is left to Bullet, so that mechanisms at rest do not change."""
@@ -69,6 +69,8 @@ def measure_loops(tree_table: Integers, loop_table: Integers) -> float:
     trees, loops = open_trees(tree_table), open_loops(loop_table)
     widest = 0.0
     for m in range(loops.size.shape[0]):
+        if loops.begin[m] == loops.begin[m + 1]:
+            continue
         link(trees, loops, m)
         measure(trees, loops, m)
         for c in range(loops.begin[m], loops.begin[m + 1]):
@@ -87,10 +89,13 @@ def close_loops(handle: int, tree_table: Integers, loop_table: Integers, most: f
     trees, loops = open_trees(tree_table), open_loops(loop_table)
     left = 0.0
     for m in range(loops.size.shape[0]):
+        loops.moved[m] = UNMOVED
+        looped = loops.begin[m] < loops.begin[m + 1]
+        if not (looped or _too_fast(trees, loops, m)):
+            continue
         link(trees, loops, m)
         widest = measure(trees, loops, m)
-        loops.moved[m] = UNMOVED
-        if widest > CLOSED or _too_fast(trees, loops, m):
+        if widest > CLOSED or not looped or _too_fast(trees, loops, m):
             loops.moved[m] = MOVED if _project(trees, loops, m, widest, most, dt) else FAILED
             for t in range(loops.tree_begin[m], loops.tree_begin[m + 1]):
                 k = loops.tree[t]
@@ -106,12 +111,12 @@ def close_loops(handle: int, tree_table: Integers, loop_table: Integers, most: f
 
 @inlined
 def _too_fast(trees: Trees, loops: Loops, m: int) -> bool:
-    """Whether a coordinate of mechanism ``m`` exceeds `MAX_SPEED`, which Bullet does not see to where there are loops."""
+    """Whether a coordinate of mechanism ``m`` exceeds `Loops.most`."""
     gather(trees, loops, m)
-    fastest = 0.0
+    fast = False
     for a in range(loops.size[m]):
-        fastest = max(fastest, abs(loops.speed[a]))
-    return fastest > (1.0 + SLACK) * MAX_SPEED
+        fast = fast or abs(loops.speed[a]) > SLACK * loops.most[a]
+    return fast
 
 
 @kernel

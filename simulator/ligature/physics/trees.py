@@ -50,6 +50,19 @@ REST_SPEED = 1e-12
 """Speed in rad/s or m/s below which joints that nothing pushes stand: at this one, an hour makes 4 nm."""
 
 
+MAX_RATE = 100.0
+"""Maximum speed in rad/s or m/s of a coordinate of a tree with joints, as in Bullet; the projection sees to it."""
+
+PARALLEL_RATE = 20.0
+"""The same in rad/s for the two others of three turning axes where the middle one, at 90°, makes them parallel.
+
+There their speeds are large and nearly cancel. At 100 rad/s they turn by 0.1 rad in a tick of 1 ms, and what is left of
+them, which moves the body, is off by more than it is.
+"""
+
+SLACK = 1.0 + 1e-6
+"""How much faster than that a coordinate may be: rounding does not count."""
+
 TURN_PER_CHORD = math.pi
 """Angle over the distance of two unit quaternions that are at most half a turn apart, from above."""
 
@@ -72,6 +85,7 @@ class Trees(NamedTuple):
     sleepers_begin: Integers  # (k + 1,)
     ticks: Integers  # (1,) ticks since bodies were put where they began; before the first, no motor has an effort
     link: Integers  # (a,) Bullet's link of each axis
+    middle: Integers  # (a,) how many axes on the middle one of three turning axes is, for the two others; else 0
     limp: Flags  # (a,) whether no motor drives it
     sent: Flags  # (a,) whether it reports another effort than its motor's, and that
     sent_effort: Array  # (a,)
@@ -107,7 +121,7 @@ def trees(count: int, rows: int, axes: int, sleepers: int = 0, compared: Boxes |
         turning=z(count, no), measured=z(count, no), read=z(count, no), linked=z(count, no), ticks=z(1, whole),
         quiet=z(count, no), still=z(count, no), asleep=z(count, no), sleepers=z(sleepers, whole),
         sleepers_begin=z(count + 1, whole), before=z(axes), last_motor=np.full((2, axes), np.nan),
-        link=z(axes, whole), limp=np.ones(axes, no), sent=z(axes, no), sent_effort=z(axes),
+        link=z(axes, whole), middle=z(axes, whole), limp=np.ones(axes, no), sent=z(axes, no), sent_effort=z(axes),
         rows=np.full((rows, 3), -1), fixed=z((rows, 17)), far=np.full(rows, np.inf), mass=z(rows), inertia=z((rows, 3)),
         pose=z((rows, 7)), twist=z((rows, 6)), frame=z((rows, 7)), speed=z((rows, 6)), joints=z((3, axes)),
         reaction=z((axes, 6)), force=z((rows, 3)), load=z((rows, 6)), push=z(axes), answer=answer,
@@ -262,14 +276,30 @@ def pass_tick(trees: Trees) -> None:
 
 @inlined
 def below(trees: Trees, limit: float) -> bool:
-    """Whether all velocities of bases and joints are finite and below ``limit``."""
+    """Whether bodies without joints are slower than ``limit``, coordinates of trees with joints within `most_rate`."""
     sound = True
     for k in range(trees.uid.shape[0]):
+        most = limit if trees.first[k] == trees.first[k + 1] else SLACK * MAX_RATE
         for a in range(6):
-            sound = sound and abs(trees.twist[trees.begin[k], a]) < limit
+            sound = sound and abs(trees.twist[trees.begin[k], a]) < most
     for i in range(trees.link.shape[0]):
-        sound = sound and abs(trees.joints[1, i]) < limit
+        speed = abs(trees.joints[1, i])
+        sound = sound and (speed < PARALLEL_RATE or speed < SLACK * most_rate(trees, i))
     return sound
+
+
+@inlined
+def part_moved(trees: Trees, i: int) -> float:
+    """Part of the inertia that axis ``i``, one of three that turn, moves alone: cos² of how far the middle one is."""
+    return np.cos(trees.joints[0, i + trees.middle[i]]) ** 2
+
+
+@inlined
+def most_rate(trees: Trees, i: int) -> float:
+    """Maximum speed of axis ``i`` where its tree is: that of parallel axes from about 60° of the middle one on."""
+    if trees.middle[i] == 0:
+        return MAX_RATE
+    return PARALLEL_RATE + (MAX_RATE - PARALLEL_RATE) * part_moved(trees, i) ** 2
 
 
 @kernel

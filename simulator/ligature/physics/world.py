@@ -267,11 +267,12 @@ class World(Subsystem):
         self.masses.lift()
         self.chunks.follow()
         sound = self.engine.motions.step(MAX_SPEED)
-        if sound:
-            self.problems += self._closures.project()
+        healthy = sound or not diverged(self.engine)
+        if healthy:
+            self.problems += self._closures.project(not sound)
         self._parting.step()
         self.collisions.step(tick)
-        if not sound:
+        if not healthy:
             self._heal()
 
     @property
@@ -286,8 +287,10 @@ class World(Subsystem):
 
     def conclude(self, sound: bool) -> None:
         """Put back what diverged in ticks of compiled code, unless all is ``sound``."""
-        if not sound:
+        if not sound and diverged(self.engine):
             self._heal()
+        elif not sound:
+            self.problems += self._closures.project(True)
 
     def _heal(self) -> None:
         """Reset trees that diverged to their initial poses, with all trees that loops join to them."""
@@ -344,19 +347,30 @@ class World(Subsystem):
         read_bodies(motions.handle, motions.table, engine.place_table, bodies, out)
 
     def set_pose(self, body: int, pose: Array) -> None:
-        """Put the root ``body`` of a tree at ``pose`` (7,), world axes, at rest; raises ValueError as `check_root`."""
-        self.check_root(body)
+        """Put the root ``body`` of a tree at ``pose`` (7,), world axes, at rest, as the joints of a tree that moves."""
+        tree = self.engine.place_of[body].tree
+        if not self.engine.trees[tree].static and self.engine.trees[tree].axes:
+            self.engine.motions.joints(tree)
+            self.engine.motions.halt(tree)
         self.engine.place_of[body].set_pose(pose)
         self._parting.begin()
 
-    def check_root(self, body: int) -> None:
-        """Raise ValueError for a body that is not the root of a tree: joints hold it, or it is a part of a thread."""
-        place = self.engine.place_of.get(body)
-        if place is not None and place.link < 0:
-            return
-        name = self.scene.bodies[body].identity.identifier
+    def moving_with(self, body: int) -> tuple[int, ...]:
+        """The bodies that are put elsewhere when ``body`` is, the root of their tree first.
+
+        Raises
+        ------
+        ValueError
+            For a body that joints hold to one that stands, and for a part of a thread.
+        """
+        place, name = self.engine.place_of.get(body), self.scene.bodies[body].identity.identifier
         if place is None:
             raise ValueError(f"body '{name}' is an element of a thread; set the pose of a body at an end of it")
+        tree = self.engine.trees[place.tree]
+        if not tree.static:
+            return (tree.root, *(other for other in tree.link_of if other != tree.root))
+        if place.link < 0:
+            return (body,)
         raise ValueError(f"body '{name}' is held by joints; set its joints, or the pose of its root")
 
     def set_joint_position(self, joint: int, position: float, velocity: float = 0.0) -> None:

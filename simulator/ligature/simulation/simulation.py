@@ -30,7 +30,7 @@ from ligature.model.commands import (
     WatchContacts,
     object_counts,
 )
-from ligature.model.frames import inverse, pose7_matrix
+from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.model.handles import BodyHandle, Handles, JointHandle
 from ligature.model.messages import Message, handle
 from ligature.model.scene import Actuator, Body, Camera, Light, Scene
@@ -245,7 +245,10 @@ class Simulation:
             self.arms.release(command.index)
 
     def set_pose(self, body: int, pose: Array) -> None:
-        """Move the root ``body`` of a tree to ``pose``, at rest, together with a thread that is attached to it alone.
+        """Move a ``body`` to ``pose``, at rest, together with a thread that is attached to it alone.
+
+        What joints hold to it moves along, and the joints stay where they are. Of bodies that joints hold to one that
+        stands, only that one can be moved.
 
         Parameters
         ----------
@@ -257,17 +260,20 @@ class Simulation:
         Raises
         ------
         ValueError
-            For a body that a joint holds, such as a link of an arm, and for an element of a thread.
+            For a body that joints hold to one that stands, as a link of an arm, and for an element of a thread.
         """
         self._check_open()
         BodyCommand(body, CommandType.POSITION, tuple(pose)).check(self._counts)
-        self._world.check_root(body)
-        before = pose7_matrix(self._world.pose7(body))
-        self.grasps.release_body(body)
-        self._world.set_pose(body, pose)
-        self._suture.rods.carry(body, pose7_matrix(pose) @ inverse(before))
-        self._suture.holes.forget(body)
-        self.tissues.forget(body)
+        moved = self._world.moving_with(body)
+        root = moved[0]
+        T = pose7_matrix(pose) @ inverse(pose7_matrix(self._world.pose7(body)))
+        for other in moved:
+            self.grasps.release_body(other)
+        self._world.set_pose(root, pose if root == body else matrix_pose7(T @ pose7_matrix(self._world.pose7(root))))
+        for other in moved:
+            self._suture.rods.carry(other, T)
+            self._suture.holes.forget(other)
+            self.tissues.forget(other)
         self._write_state()
         self._watch_anew()
 
