@@ -9,7 +9,9 @@ import ligature
 import numpy as np
 import pytest
 from ligature.adf import Diagnostic
+from ligature.cli.check import findings
 from ligature.model.commands import CommandType
+from ligature.physics.guard import STRONG_GRAVITY
 
 BALL = "{name: ball, mass: 0.1, collision shape: SPHERE, collision geometry: {radius: 0.02}}"
 ZERO, UP = "{x: 0, y: 0, z: 0}", "{x: 0, y: 0, z: 1}"
@@ -123,6 +125,46 @@ def test_the_likely_cause_is_named(make: Callable[[Path], tuple[ligature.Simulat
     simulation.step(90)
     (alarm,) = alarms(simulation)
     assert cause in alarm.message
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_check_reports_each_gravity_that_no_room_has_once(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    gravities = [rng.normal(size=3) * 10.0 ** rng.uniform(-1, 2.3) for _ in range(4)]
+    gravities.append(gravities[0])
+    lines = [f"bodies: [{', '.join(f'B{i}' for i in range(len(gravities)))}]"]
+    for i, g in enumerate(gravities):
+        vector = f"{{x: {g[0]}, y: {g[1]}, z: {g[2]}}}"
+        lines.append(f"B{i}: {{name: b{i}, mass: {i % 4}, gravity: {vector}}}")
+    (tmp_path / "m.yaml").write_text("\n".join(lines))
+    found = [d.message for d in findings(tmp_path / "m.yaml", [], strict=False) if d.code == "speed"]
+    moving = [float(np.linalg.norm(g)) for i, g in enumerate(gravities) if i % 4]
+    strong = [g for g in moving if g > STRONG_GRAVITY]
+    assert [message.split()[2] for message in found] == [f"{g:g}" for g in strong]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_check_reports_resistance_sensors_that_throw_their_body(seed: int, tmp_path: Path) -> None:
+    """A body is let go with its rays in a wall almost as far as they reach; without gravity nothing else moves it."""
+    rng = np.random.default_rng(seed)
+    reach, mass = float(rng.uniform(0.05, 0.5)), 10.0 ** float(rng.uniform(-3, 0))
+    count, speed = int(rng.integers(1, 4)), float(rng.uniform(5.0, 45.0) if seed % 2 else rng.uniform(55.0, 90.0))
+    force = mass * speed**2 / (count * reach)
+    down = "direction: {x: 0, y: 0, z: -1}"
+    rays = ", ".join(f"{{offset: {{x: {0.01 * i}, y: 0, z: 0}}, {down}}}" for i in range(count))
+    (tmp_path / "m.yaml").write_text(
+        f"gravity: {ZERO}\nbodies: [WALL, B]\nsensors: [S]\n"
+        "WALL: {name: w, mass: 0, collision shape: BOX, collision geometry: {x: 9, y: 9, z: 0.2}, "
+        f"location: {{position: {{x: 0, y: 0, z: {-0.1 - 0.01 * reach}}}}}}}\n"
+        f"B: {{name: b, mass: {mass}, inertia: {{ix: 10, iy: 10, iz: 10}}, damping: {{linear: 0}}, location: {{}}}}\n"
+        f"S: {{name: s, parent: B, type: Resistance, range: {reach}, contact stiffness: {force}, array: [{rays}]}}\n"
+    )
+    found = [d.message for d in findings(tmp_path / "m.yaml", [], strict=False) if d.code == "speed"]
+    assert len(found) == 1 - seed % 2, found
+    assert all(f"at {speed:.3g} m/s" in message for message in found)
+    simulation = ligature.Simulation(ligature.load(tmp_path / "m.yaml"))
+    simulation.step(200)
+    assert simulation.state["body_twist"][0, 1, 2] == pytest.approx(speed, rel=0.1)
 
 
 def test_the_guard_changes_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

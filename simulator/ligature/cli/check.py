@@ -16,7 +16,7 @@ from ligature.cli.numbers import counted
 from ligature.mesh import load_mesh
 from ligature.model import reach
 from ligature.model.scene import Scene
-from ligature.physics import inertias, overlaps, springs
+from ligature.physics import guard, inertias, overlaps, springs
 from ligature.physics.engine import Engine
 
 _STYLES = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.INFO: "", Severity.DEBUG: "dim"}
@@ -64,8 +64,8 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
     except ligature.SceneError as error:
         return list(error.diagnostics)
     later = [
-        *reach.findings(scene), *inertias.findings(scene), *_at_start(scene), *_shaders(scene, resolver),
-        *_looks(scene, resolver),
+        *reach.findings(scene), *inertias.findings(scene), *guard.findings(scene), *_at_start(scene),
+        *_shaders(scene, resolver), *_looks(scene, resolver),
     ]  # fmt: skip
     return _distinct([*document.diagnostics, *scene.diagnostics, *later])
 

@@ -12,7 +12,7 @@ from ligature.adf import Diagnostic, Severity
 from ligature.adf.diagnostics import length
 from ligature.kernels import compiled
 from ligature.model.frames import pose7_matrix
-from ligature.model.scene import Body, Joint, JointType, Scene
+from ligature.model.scene import Body, Joint, JointType, Scene, SensorType
 from ligature.model.state import StateRecord
 from ligature.physics.inertias import inertia_of
 from ligature.physics.overlaps import DEEP
@@ -64,6 +64,47 @@ def _suspect(twist: Array, gyration: Array, mass: Array, rigid: Flags, before: A
     if worst < 0 and leaper >= 0 and gained > 0.5 * share:
         return leaper
     return worst
+
+
+def findings(scene: Scene) -> list[Diagnostic]:
+    """Warnings of what moves bodies at `MAX_SPEED` by the numbers of the files alone."""
+    return [*_of_gravity(scene), *_of_resistance(scene)]
+
+
+def _of_gravity(scene: Scene) -> list[Diagnostic]:
+    """One for each gravity above `STRONG_GRAVITY`, at the first of the bodies that feel it."""
+    strong: dict[float, list[Body]] = {}
+    for body in scene.bodies:
+        gravity = float(np.linalg.norm(body.gravity))
+        if not body.static and gravity > STRONG_GRAVITY:
+            strong.setdefault(gravity, []).append(body)
+    found = []
+    for gravity, bodies in strong.items():
+        first, others = bodies[0].identity, len(bodies) - 1
+        who = f"'{first.identifier}'" + (f" and {others} more bodies" if others else "")
+        message = f"gravity of {gravity:g} m/s² moves {who} at {MAX_SPEED:g} m/s after {MAX_SPEED / gravity:.2g} s"
+        found.append(Diagnostic(Severity.WARNING, message, first.mark, "write gravity in m/s²", "speed"))
+    return found
+
+
+def _of_resistance(scene: Scene) -> list[Diagnostic]:
+    """One for each resistance sensor whose rays, pressed in whole, hold the energy to move its body so fast."""
+    found = []
+    for sensor in scene.sensors:
+        body, stiffness = scene.bodies[sensor.parent], sensor.resistance.contact_stiffness
+        if sensor.type is not SensorType.RESISTANCE or body.static or body.index in scene.rod_bodies:
+            continue
+        way = float(np.linalg.norm(sensor.rays[:, 1] - sensor.rays[:, 0], axis=1).sum())
+        speed = (stiffness * way / body.mass) ** 0.5  # the force falls from `stiffness` to 0 along a ray
+        if speed >= MAX_SPEED:
+            message = (
+                f"resistance sensor '{sensor.identity.key}' can throw '{body.identity.identifier}' "
+                f"({body.mass:.3g} kg) at {speed:.3g} m/s: its rays push with up to {stiffness:g} N each, "
+                f"along {length(way)} in all"
+            )
+            hint = "make 'range' or 'contact stiffness' smaller"
+            found.append(Diagnostic(Severity.WARNING, message, sensor.identity.mark, hint, "speed"))
+    return found
 
 
 class Guard:
