@@ -69,7 +69,7 @@ class _Plan:
         """Add the links of one joint and of the body ``outer`` that it carries; the last of them."""
         T_parent_link = self.T_link_inertial[chain.inner] @ chain.T_inner
         parent = self.link_of[chain.inner]
-        inertia = _inertia_on(outer, chain.axes, self.dt)
+        inertia = _inertia_on(outer, inner, chain.axes, self.dt)
         moved = [_effective(outer, inertia, axis, chain.T_outer) for axis in chain.axes]
         if any(axis.sprung for axis in chain.axes):
             frames = (chain.T_inner, chain.T_outer)
@@ -305,17 +305,18 @@ def needs_link(scene: Scene, closure: Closure) -> bool:
     return not is_point(scene, closure) or len(closure.free) in (1, 2)
 
 
-def _inertia_on(body: Body, steps: Sequence[Axis], dt: float) -> Array:
-    """`inertia_of` a body on the axes of its joint.
+def _inertia_on(body: Body, inner: Body, steps: Sequence[Axis], dt: float) -> Array:
+    """`inertia_of` a body on the axes of its joint to an ``inner`` one.
 
     Where the file leaves the inertia open it is large enough for the springs and dampers to act in full in
-    ticks of ``dt``; else they are capped (`STIFFEST`), and a tissue hole swings where its file makes it stiff.
+    ticks of ``dt``; else they are capped (`STIFFEST`), and a tissue hole swings where its file makes it stiff. It is
+    not made larger than that of an inner body that moves, which the Coriolis moments of such a one would throw.
     """
     turning = [axis for axis in steps if not axis.prismatic]
     if not body.inertia_estimated or body.mass == 0.0 or not turning:
         return inertia_of(body)
     needed = max(max(STIFFEST * dt * dt * axis.stiffness, dt * axis.damping / MOST_DAMPED) for axis in turning)
-    return np.maximum(inertia_of(body), needed)
+    return np.maximum(inertia_of(body), needed if inner.mass == 0.0 else min(needed, float(inertia_of(inner).min())))
 
 
 def _effective(body: Body, inertia: Array, axis: Axis, T_inertial_frame: Array) -> float:

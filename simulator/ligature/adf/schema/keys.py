@@ -128,7 +128,7 @@ FARTHEST = 1e4
 """Largest length in metres: beyond it collisions of parts of millimetres lose precision."""
 
 LONGEST_ARM = 100.0
-"""Largest distance in metres of a centre of mass from its body's frame: the lever multiplies errors of rotation."""
+"""Largest distance in metres of a centre of mass or a joint from its body's frame: it multiplies errors of rotation."""
 
 LARGEST_SCALE = 1e3
 """Largest scale of a mesh: that between millimetres and metres."""
