@@ -126,13 +126,8 @@ def test_a_thread_with_elements_at_the_wrong_place_stays_in_one_piece(tmp_path: 
         simulation.close()
 
 
-@given(which=st.integers(0, N - 1), length=st.sampled_from([0.0, 1e-9, 4e-7, 20.0, 190.0]))
-@settings(max_examples=20, deadline=None)
-def test_a_chain_with_an_element_of_no_length_or_of_far_too_much_stays_bodies_and_is_reported(
-    tmp_path_factory: pytest.TempPathFactory, which: int, length: float
-) -> None:
-    """Its joints meet the element at one place, or one at the middle of an end; or a pivot is far out."""
-    folder = tmp_path_factory.mktemp("short")
+def with_length(folder: Path, which: int, length: float) -> ligature.Scene:
+    """A straight thread in which the joints of one element give it this ``length``, in metres."""
     thread(folder, {})
     path = folder / "model.yaml"
     model = yaml.safe_load(path.read_text())
@@ -140,10 +135,22 @@ def test_a_chain_with_an_element_of_no_length_or_of_far_too_much_stays_bodies_an
         if f"JOINT {joint}" in model:
             model[f"JOINT {joint}"][f"{side} pivot"] = xyz(sign * length, 0, 0)
     path.write_text(yaml.safe_dump(model, sort_keys=False))
-    scene = ligature.load(path)
+    return ligature.load(path)
+
+
+@given(which=st.integers(0, N - 1), length=st.sampled_from([0.0, 1e-9, 4e-7, 20.0, 190.0]))
+@settings(max_examples=20, deadline=None)
+def test_a_chain_with_an_element_of_no_length_or_of_far_too_much_stays_bodies_and_is_reported(
+    tmp_path_factory: pytest.TempPathFactory, which: int, length: float
+) -> None:
+    """Its joints meet the element at one place, or one at the middle of an end; or a pivot is far out."""
+    scene = with_length(tmp_path_factory.mktemp("length"), which, length)
     (found,) = [d for d in scene.diagnostics if d.code == "rod"]
     assert not scene.rods and f"the joints of 'BODY {which}' " in found.message
     assert ("leave it no length" in found.message) == (length < 1.0)
+    simulation = ligature.Simulation(scene)
+    simulation.step(10)
+    simulation.close()
 
 
 @pytest.mark.parametrize("which", [0, 3, N - 1])
@@ -151,14 +158,7 @@ def test_a_chain_with_an_element_of_no_length_or_of_far_too_much_stays_bodies_an
 def test_what_is_simulated_as_a_rod_moves_whatever_the_length_of_an_element(
     tmp_path: Path, which: int, length: float
 ) -> None:
-    thread(tmp_path, {})
-    path = tmp_path / "model.yaml"
-    model = yaml.safe_load(path.read_text())
-    for joint, side, sign in ((which - 1, "child", -0.5), (which, "parent", 0.5)):
-        if f"JOINT {joint}" in model:
-            model[f"JOINT {joint}"][f"{side} pivot"] = xyz(sign * length, 0, 0)
-    path.write_text(yaml.safe_dump(model, sort_keys=False))
-    scene = ligature.load(path)
+    scene = with_length(tmp_path, which, length)
     assert scene.rods
     simulation = ligature.Simulation(scene)
     try:
@@ -167,6 +167,3 @@ def test_what_is_simulated_as_a_rod_moves_whatever_the_length_of_an_element(
         assert np.linalg.norm(simulation.state["body_twist"][0, :, :3], axis=1).max() < 6.0
     finally:
         simulation.close()
-    simulation = ligature.Simulation(scene)
-    simulation.step(10)
-    simulation.close()

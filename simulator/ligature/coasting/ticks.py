@@ -37,8 +37,9 @@ def coast(
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Advance by up to ``ticks``, and where ``begins`` is 1 begin another one, up to the step of the bodies.
 
-    It ends after one in which anything is not finite or has a speed not below ``limit``, and within one in which
-    something has entered or left a hole, other bodies are near the threads than before, or a jaw may grasp or let go.
+    It ends after one in which anything is not finite or faster than bodies may be (`Motions.step`), and within one in
+    which something has entered or left a hole, other bodies are near the threads than before, or a jaw may grasp or let
+    go.
     It ends before one in which an arm is found away from its set-point.
 
     The first arguments are those of `prepare`; ``total`` and ``acted`` are those of `Impulses`, ``search`` the table of

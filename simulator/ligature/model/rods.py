@@ -31,14 +31,16 @@ def find_rods(
     ``opted_out`` are bodies that must stay bodies.
     """
     chains = _chains(bodies, joints, opted_out)
-    rods, between = _without_joints_between([chain for chain in chains if _misshapen(chain) is None], joints)
+    misshapen = [_misshapen(chain) for chain in chains]
+    fit = [chain for chain, element in zip(chains, misshapen, strict=True) if element is None]
+    rods, between = _without_joints_between(fit, joints)
     moved, findings = _joined(rods, bodies, joints)
     placed = [replace(b, T_world_body=moved[b.index]) if b.index in moved else b for b in bodies]
     findings += [_finding_of_joint(joint) for joint in between]
     findings += [
         _finding_of_length(chain, element, bodies[chain.bodies[element]])
-        for chain in chains
-        if (element := _misshapen(chain)) is not None
+        for chain, element in zip(chains, misshapen, strict=True)
+        if element is not None
     ]
     elements = {body for rod in rods for body in rod.bodies}
     findings += [

@@ -81,7 +81,7 @@ def _of_gravity(scene: Scene) -> list[Diagnostic]:
     found = []
     for gravity, bodies in strong.items():
         first, others = bodies[0].identity, len(bodies) - 1
-        who = f"'{first.identifier}'" + (f" and {others} more bodies" if others else "")
+        who = f"'{first.identifier}'" + (f" and {others} more" if others else "")
         message = f"gravity of {gravity:g} m/s² moves {who} at {MAX_SPEED:g} m/s after {MAX_SPEED / gravity:.2g} s"
         found.append(Diagnostic(Severity.WARNING, message, first.mark, "write gravity in m/s²", "speed"))
     return found

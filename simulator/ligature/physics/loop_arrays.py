@@ -15,7 +15,7 @@ Flags = NDArray[np.bool_]
 
 
 class Loops(NamedTuple):
-    """Mechanisms with loops: m mechanisms of t trees and c closures; r rows and a axes of all trees.
+    """Mechanisms, with loops or of one tree: m mechanisms of t trees and c closures; r rows and a axes of all trees.
 
     At most n coordinates and k = 6 c + n rows of constraints in a mechanism.
     """

@@ -286,7 +286,7 @@ class World(Subsystem):
         return not (self.collisions.waits or self._parting.watches or self.chunks.bodies or self.scene.closures)
 
     def conclude(self, sound: bool) -> None:
-        """Put back what diverged in ticks of compiled code, unless all is ``sound``."""
+        """Put back what diverged in ticks of compiled code, or slow down what is too fast, unless all is ``sound``."""
         if not sound and diverged(self.engine):
             self._heal()
         elif not sound:
