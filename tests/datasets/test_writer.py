@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from ligature.datasets import DatasetError, DatasetWriter
+from ligature.datasets import DatasetError, DatasetWriter, rows
 from ligature.datasets.store import episode_names, join, opened
+from ligature.render.cameras import CameraHandle
+from ligature.render.target import Exposure
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
@@ -49,6 +51,29 @@ def written(simulation: ligature.Simulation, tmp_path_factory: pytest.TempPathFa
     np.savez(folder / "truth.npz", time=[t for t, *_ in truth], needle=[n for _, n, _ in truth],
              joints=[j.position for *_, j in truth], rgb=picture.rgb, depth=picture.depth, ids=picture.ids)  # fmt: skip
     return path
+
+
+def test_pictures_are_packed_while_those_of_the_next_sample_are_drawn(
+    simulation: ligature.Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+
+    def noting(owner: type, method: str, name: str) -> None:
+        real = getattr(owner, method)
+        monkeypatch.setattr(owner, method, lambda *given, **options: done.append(name) or real(*given, **options))
+
+    noting(CameraHandle, "expose", "begin")
+    noting(Exposure, "fetch", "fetch")
+    noting(rows, "packed", "pack")
+    with DatasetWriter(tmp_path / "data.h5", simulation, ("cameraL",), (64, 48), rate=1000.0) as writer:
+        for _ in range(3):
+            simulation.step()
+            done.append("sample")
+            writer.sample()
+        done.append("end")
+    first, *samples, end = "".join({"sample": " ", "end": " "}.get(name, name[0]) for name in done).split()
+    steps = [list(dict.fromkeys(steps)) for steps in samples]
+    assert first == "b" and steps == [list("fbp")] * 2 and "b" not in end and end.count("p") == 3
 
 
 def test_samples_come_at_the_rate_and_state_what_was_there(written: Path) -> None:
@@ -272,7 +297,7 @@ FULL = """
 import resource, sys
 import ligature
 from pathlib import Path
-from ligature.datasets import DatasetError, DatasetWriter
+from ligature.datasets import DatasetError, DatasetWriter, rows
 simulation = ligature.Simulation(ligature.load({scene!r}))
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 try:

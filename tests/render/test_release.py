@@ -153,6 +153,7 @@ def test_exposures_show_the_moment_they_began_in_whatever_comes_before_they_are_
         simulation.step()
         truth.append(camera.capture())
         begun.append(camera.expose())
+    begun[1].fetch()
     camera.capture((64, 48))
     simulation.close()  # finishes what has been begun
     assert (truth[0].rgb != truth[2].rgb).any()

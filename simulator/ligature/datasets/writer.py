@@ -166,12 +166,11 @@ class DatasetWriter:
                 self._begin(time)
             self._shapes = {name: value.shape for name, value in extras.items()}
             assert self._rows is not None
-            self._append_pictures()
+            self._append_pictures(self._exposed())
             for name, value, options in self._values(phase, arms):
                 self._rows.append(name, value, **options)
             for name, value in extras.items():
                 self._rows.append(f"extra/{name}", value, "f4", units="the caller's")
-            self._exposures = {name: camera.expose(self._size) for name, camera in self._cameras.items()}
             self._store.check()
         self._samples += 1
         self._due += self._period
@@ -211,7 +210,8 @@ class DatasetWriter:
         _check_texts(remarks)
         with self._writing():
             assert self._rows is not None
-            self._append_pictures()
+            self._append_pictures(self._exposures)
+            self._exposures = {}
             self._rows.finish()
             attributes = self._episode.attrs
             attributes["success"], attributes["samples"], attributes["task"] = success, self._samples, self._task
@@ -280,10 +280,19 @@ class DatasetWriter:
         wrench = {"dtype": "f4", "units": "N, N m", "axes": WRENCH}
         yield f"arms/{arm.name}/spatial_measured_cf", record["spatial_measured_cf"], wrench
 
-    def _append_pictures(self) -> None:
-        """Add the pictures of the last sample, which were drawn while the simulation went on."""
+    def _exposed(self) -> dict[str, Exposure]:
+        """Begin the pictures of this sample; returns those of the last one, which were drawn since then.
+
+        The last ones are developed and packed while the new ones are drawn.
+        """
+        for exposure in self._exposures.values():
+            exposure.fetch()
+        begun = {name: camera.expose(self._size) for name, camera in self._cameras.items()}
+        drawn, self._exposures = self._exposures, begun
+        return drawn
+
+    def _append_pictures(self, exposures: Mapping[str, Exposure]) -> None:
         assert self._rows is not None
-        exposures, self._exposures = self._exposures, {}
         for name, exposure in exposures.items():
             picture = exposure.frame()
             steps = np.where(np.isfinite(picture.depth), picture.depth / DEPTH_UNIT, 0.0)

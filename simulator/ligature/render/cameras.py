@@ -134,7 +134,7 @@ class CameraHandle:
         view, moment = self.view(resolution, eye), (self.camera.index, int(state["tick"][0]))
         shaders = self.camera.preprocessing_shaders
         drawn = self._studio.renderer.expose(state, sensor.view(view), passes, shaders)
-        return Exposure(lambda: sensor.expose(drawn.frame(), view, moment))
+        return drawn.then(lambda frame: sensor.expose(frame, view, moment))
 
     def calibration(
         self, resolution: tuple[int, int] | None = None, *, eye: str = "", sensor: ImageSensor = IDEAL

@@ -32,7 +32,7 @@ from ligature.render.programs import Programs
 from ligature.render.rays import volume_rays
 from ligature.render.sky import Sky
 from ligature.render.surface import Physical, Surface, surface_of
-from ligature.render.target import PASSES, Exposure, Frame, Target
+from ligature.render.target import PASSES, Exposure, Frame, Target, developed
 from ligature.render.textures import Textures
 from ligature.render.thread import Tube
 from ligature.render.tissue import Marks, tissue_surfaces
@@ -187,18 +187,18 @@ class Renderer:
         """
         with self._context:  # several renderers may live in one process; leaving it hands the work to the driver
             self._context.gc()
-            target, finish = self._drawn(state, view, passes, shaders)
-        exposure = Exposure(partial(self._read, target, finish))
+            target, colours = self._drawn(state, view, passes, shaders)
+        exposure = Exposure(partial(self._read, target, colours))
         self._exposures.add(exposure)
         return exposure
 
-    def _read(self, target: Target, finish: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Frame:
-        """The picture in ``target``, which is free for another one then."""
+    def _read(self, target: Target, colours: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Callable[[], Frame]:
+        """Copy the picture in ``target``, which is free for another one then; returns what develops the copy."""
         with self._context:
-            frame = target.read(finish)
+            readings = target.read()
             self._targets.append(target)  # the newest come last
             del self._targets[:-MAX_TARGETS]
-        return frame
+        return partial(developed, readings, colours)
 
     def _drawn(
         self, state: NDArray[np.void], view: CameraView, passes: Sequence[str], shaders: ShaderFiles | None
@@ -251,7 +251,7 @@ class Renderer:
         Pictures that are being drawn are finished.
         """
         for exposure in list(self._exposures):
-            exposure.frame()
+            exposure.fetch()
         if self._end is not None:
             self._end()
         _alive.discard(self)

@@ -25,6 +25,9 @@ the others, where integers would have to be written, which waits for all that is
 """
 
 
+Readings = dict[str, NDArray[Any]]
+"""By pass what OpenGL keeps of a picture (h, w, channels), top row first."""
+
 SATURATED = 255
 """Level of a colour channel above which the picture holds no more light."""
 
@@ -94,43 +97,67 @@ class Target:
         """Where the pass of that name is drawn."""
         return self._textures[name]
 
-    def read(self, finish: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Frame:
-        """Copy the picture out, top row first; ``finish`` makes (h, w, 3) of the colours and alpha (h, w, 4)."""
+    def read(self) -> Readings:
+        """Copy the picture out, as OpenGL keeps it."""
         if self._resolved is not None and self.colour is not None:
             self._context.copy_framebuffer(self._resolved, self.colour)
-        arrays = {name: self._array(name) for name in self.passes}
-        if "rgb" in arrays:
-            arrays["rgb"] = finish(arrays["rgb"])
-        return Frame(**{name: np.ascontiguousarray(array) for name, array in arrays.items()})
+        return {name: self._array(name) for name in self.passes}
 
     def _array(self, name: str) -> NDArray[Any]:
         width, height = self.size
         channels, dtype = PASSES[name]
         data = np.frombuffer(self._textures[name].read(), dtype="u1" if dtype == "f1" else dtype)
-        rows = data.reshape(height, width, channels)[::-1]
-        if name == "depth":
-            depth = rows[..., 0].copy()
-            depth[depth == 0.0] = np.inf  # where nothing was drawn
-            return depth
-        if name in ("ids", "parts"):
-            return rows[..., 0].astype(np.int32)
-        return rows[..., : 3 if name == "normals" else channels]
+        return data.reshape(height, width, channels)[::-1]
+
+
+def developed(readings: Readings, colours: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Frame:
+    """The picture that a target's ``readings`` show; ``colours`` makes (h, w, 3) of colours and alpha (h, w, 4)."""
+    arrays = dict(readings)
+    for name, array in readings.items():
+        if name == "rgb":
+            arrays[name] = colours(array)
+        elif name == "depth":
+            arrays[name] = np.where(array[..., 0] == 0.0, np.float32(np.inf), array[..., 0])  # 0: nothing was drawn
+        elif name in ("ids", "parts"):
+            arrays[name] = array[..., 0].astype(np.int32)
+        elif name == "normals":
+            arrays[name] = array[..., :3]
+    return Frame(**{name: np.ascontiguousarray(array) for name, array in arrays.items()})
 
 
 class Exposure:
     """A picture that is being drawn.
 
     On a software rasteriser it is drawn by other threads, beside what its caller does until it asks for the `frame`.
-    ``read`` waits for it and gives it.
+    ``read`` waits until it is drawn, copies it, and returns what makes the frame of that copy.
     """
 
-    def __init__(self, read: Callable[[], Frame]) -> None:
-        self._read: Callable[[], Frame] | None = read
+    def __init__(self, read: Callable[[], Callable[[], Frame]]) -> None:
+        self._read: Callable[[], Callable[[], Frame]] | None = read
+        self._develop: Callable[[], Frame] | None = None
         self._frame: Frame | None = None
+
+    def fetch(self) -> None:
+        """Wait until the picture is drawn and copy it; what is left for `frame` needs no OpenGL.
+
+        Who begins the next picture in between has it drawn meanwhile.
+        """
+        if self._read is not None:
+            self._develop, self._read = self._read(), None
 
     def frame(self) -> Frame:
         """The picture, which is the same each time."""
-        if self._read is not None:
-            self._frame, self._read = self._read(), None
+        self.fetch()
+        if self._develop is not None:
+            self._frame, self._develop = self._develop(), None
         assert self._frame is not None
         return self._frame
+
+    def then(self, change: Callable[[Frame], Frame]) -> Exposure:
+        """The same picture with ``change`` made to its frame."""
+
+        def read() -> Callable[[], Frame]:
+            self.fetch()
+            return lambda: change(self.frame())
+
+        return Exposure(read)
