@@ -19,6 +19,8 @@ from .write_file import PREPARED, ExportError, keeping, preparing, preparing_var
 ASKED = 0.2
 """Share of an import after it has looked for meshes outside."""
 
+_LAUNCH_KEY = re.compile(rb"(?:\A|[\r\n])['\"]?(?:multibody configs|world config)['\"]?\s*:")
+
 FURTHER = bpy.props.StringProperty(
     name="Further Folder",
     description="Folder outside the scene's own from which meshes may be read; it is remembered in the blend file",
@@ -308,7 +310,7 @@ def _further(operator):
 def _is_launch(path):
     """Whether a file is a launch file, by the keys of one."""
     try:
-        return re.search(rb"^(multibody configs|world config)\s*:", path.read_bytes(), re.MULTILINE) is not None
+        return _LAUNCH_KEY.search(path.read_bytes()) is not None
     except OSError:
         return False  # the reader reports it better
 

@@ -13,7 +13,8 @@ from .mesh_source import HIGH, LOW, NEW_FOLDERS, MeshSource
 LIBRARY_WITHIN = 65536
 """Bytes of an OBJ file in which its material libraries are named."""
 
-_LIBRARY = re.compile(rb"^mtllib\s+(.+)$", re.MULTILINE)
+_LIBRARY = re.compile(rb"(?:\A|[\r\n])mtllib[ \t]+([^\r\n]+)")
+_BREAK = re.compile(rb"(\r\n|[\r\n])")
 
 
 class OldMeshes:
@@ -72,8 +73,8 @@ class OldMeshes:
             text = self._read(path.parent / library) if _stays(library) else None
             if text is None:
                 continue
-            lines = text.split(b"\n")
-            for number, line in enumerate(lines):
+            pieces = _BREAK.split(text)
+            for number, line in enumerate(pieces):
                 words = line.decode("utf-8", "replace").split(None, 1)
                 if len(words) < 2 or not words[0].startswith("map_"):
                     continue
@@ -82,11 +83,10 @@ class OldMeshes:
                 if content is None:
                     continue
                 if not _stays(name):
-                    end = b"\r" if line.endswith(b"\r") else b""
                     name = os.path.basename(name)
-                    lines[number] = f"{words[0]} {name}".encode() + end
+                    pieces[number] = f"{words[0]} {name}".encode()
                 yield os.path.join(os.path.dirname(library), name), content
-            yield library, b"\n".join(lines)
+            yield library, b"".join(pieces)
 
 
 def joined(folder: Path, *parts: str) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,20 @@ from ligature.adf import AdfError
 from ligature.adf.nodes import MAX_DEPTH, Mapping, Scalar, Sequence, parse, plain
 
 FILE = Path("scene.yaml")
-LINE_ENDS = st.sampled_from(["\n", "\r\n", "\r"])
+LINE_ENDS = st.lists(st.sampled_from(["\n", "\r\n", "\r", "\x85", "\u2028", "\u2029"]), min_size=1, max_size=7)
+"""Those that YAML 1.1 knows, one after the other."""
+
+
+def ended(text: str, ends: list[str]) -> str:
+    """``text`` with its lines ended by ``ends`` in turn."""
+    end = cycle(ends)
+    return "".join(next(end) if letter == "\n" else letter for letter in text)
+
+
+def place(text: str, offset: int) -> tuple[int, int]:
+    """Line and column of ``offset``, by Python's own idea of lines."""
+    before = (text[:offset] + "x").splitlines()
+    return len(before), len(before[-1])
 
 
 def test_values_know_their_line_and_column() -> None:
@@ -95,12 +109,11 @@ def test_lists_keep_their_order() -> None:
 
 
 @given(st.lists(st.sampled_from(["a: 1", "# é", "b: {", "c: 2}", ""]), max_size=5), st.integers(0, 3), LINE_ENDS)
-def test_a_character_that_yaml_forbids_is_reported_where_it_is(before: list[str], blanks: int, end: str) -> None:
-    text = end.join([*before, "d: " + " " * blanks + "\a"])
-    place = (
-        f"scene.yaml:{len(before) + 1}:{blanks + 4}: error: invalid YAML: character U\\+0007 is not allowed; remove it"
-    )
-    with pytest.raises(AdfError, match=place):
+def test_a_character_that_yaml_forbids_is_reported_where_it_is(before: list[str], blanks: int, ends: list[str]) -> None:
+    text = ended("\n".join([*before, "d: " + " " * blanks + "\a"]), ends)
+    line, column = place(text, text.index("\a"))
+    message = f"scene.yaml:{line}:{column}: error: invalid YAML: character U\\+0007 is not allowed; remove it"
+    with pytest.raises(AdfError, match=message):
         parse(text, FILE)
 
 
@@ -108,17 +121,16 @@ PROPERTIES = st.sampled_from(["", "&x ", "!!str ", "&x !!str ", "&x\n      ", "!
 """What may stand before a value: an anchor, a tag, on its line or the one before."""
 
 
-@given(PROPERTIES, st.booleans())
-def test_a_value_begins_behind_its_anchor_and_tag(properties: str, relaxed: bool) -> None:
-    head = "flow:\n{\na: 1}\n" if relaxed else ""
-    text = f"{head}block:\n  inner: {properties}value # that\n"
+@given(PROPERTIES, st.booleans(), LINE_ENDS)
+def test_a_value_begins_behind_its_anchor_and_tag(properties: str, relaxed: bool, ends: list[str]) -> None:
+    head = "flow: # of {\n{\na: 1}\n" if relaxed else ""
+    text = ended(f"{head}block:\n  inner: {properties}value # that\n", ends)
     block = parse(text, FILE).get("block")
     assert isinstance(block, Mapping)
     inner = block.get("inner")
     assert isinstance(inner, Scalar) and (inner.text, inner.anchor) == ("value", "x" if "&" in properties else "")
     assert text[slice(*inner.span)] == "value"
-    before = text[: inner.span[0]].split("\n")
-    assert (inner.mark.line, inner.mark.column) == (len(before), len(before[-1]) + 1)
+    assert (inner.mark.line, inner.mark.column) == place(text, inner.span[0])
 
 
 def test_the_last_level_that_may_nest_does() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 
 import pytest
@@ -138,9 +139,18 @@ KEYS: dict[str, object] = {
 bodies = st.lists(st.sampled_from(sorted(KEYS)), min_size=1, unique=True)
 
 
+LINE_ENDS = st.sampled_from(["\n", "\r\n", "\r", "\x85", "\u2028", "\u2029"])
+"""Those that YAML knows, one after the other."""
+
+
 @settings(max_examples=60)
-@given(st.lists(bodies, min_size=1, max_size=3), st.lists(bodies, min_size=1, max_size=4), st.booleans())
-def test_any_keys_give_place_to_any_others(before: list[list[str]], after: list[list[str]], flow: bool) -> None:
+@given(
+    st.lists(bodies, min_size=1, max_size=3), st.lists(bodies, min_size=1, max_size=4), st.booleans(),
+    st.lists(LINE_ENDS, min_size=1, max_size=7),
+)  # fmt: skip
+def test_any_keys_give_place_to_any_others(
+    before: list[list[str]], after: list[list[str]], flow: bool, ends: list[str]
+) -> None:
     """Objects and keys come and go at once, also the last of a block, and the file states what is wanted."""
     files = [
         [Item("body", f"BODY {number}", {name: KEYS[name] for name in names}) for number, names in enumerate(bodies)]
@@ -150,6 +160,8 @@ def test_any_keys_give_place_to_any_others(before: list[list[str]], after: list[
     text = new_text("model", {}, files[0])
     if flow:
         text = text.replace("\n    radius: 0.01", " {radius: 0.01}")
+    end = cycle(ends)
+    text = "".join(next(end) if letter == "\n" else letter for letter in text)
     kept = {item.key for item in files[1]}
     removed = [item.key for item in files[0] if item.key not in kept]
     after_all = updated(text, "model", {}, files[1], removed)

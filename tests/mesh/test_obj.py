@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import time
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from ligature.adf import Resolver, Severity
 from ligature.mesh import Mesh, MeshError, load_mesh
 
@@ -39,19 +42,18 @@ def test_normals_that_some_corner_lacks_are_left_out(read) -> None:
     assert part.normals is None and len(part.faces) == 2
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        POINTS + "f 1 2 \\\n3 4\n",
-        (POINTS + "f 1 2 3 4\n").replace("\n", "\r\n"),
-        (POINTS + "f 1 2 3 4\n").replace("\n", "\r"),
-        (POINTS + "f 1 2 3 4\n").replace(" ", "\t"),
-        "\ufeff" + POINTS + "  f  1 2  3 4  ",
-    ],
-    ids=["continued", "DOS", "old Mac", "tabs", "byte order mark"],
+BLANKS = st.sampled_from([" ", "  ", "\t", " \\\n"])
+ENDS = st.sampled_from(["\n", "\r\n", "\r", " \n"])
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(BLANKS, min_size=1, max_size=7), st.lists(ENDS, min_size=1, max_size=7), st.sampled_from(["", "\ufeff"])
 )
-def test_line_ends_and_blanks_of_every_kind(read, text: str) -> None:
-    mesh = read(text)
+def test_line_ends_and_blanks_of_every_kind(read, blanks: list[str], ends: list[str], mark: str) -> None:
+    blank, end = cycle(blanks), cycle(ends)
+    text = "".join({" ": next(blank), "\n": "\n"}.get(letter, letter) for letter in POINTS + "f 1 2 3 4\n")
+    mesh = read(mark + "".join(next(end) if letter == "\n" else letter for letter in text))
     assert len(mesh.parts[0].faces) == 2 and not mesh.diagnostics
 
 

@@ -16,8 +16,9 @@ from typing import Any
 import yaml
 
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
+from ligature.adf.lines import lines_of
 from ligature.adf.relax import Relaxed, relax
-from ligature.adf.slips import lines_of, remedy
+from ligature.adf.slips import remedy
 
 MAX_DEPTH = 64
 MAX_NODES = 1_000_000
@@ -215,9 +216,8 @@ class _Composer:
     @staticmethod
     def _behind(mark: Mark, text: str) -> Mark:
         """The place behind ``text``, which begins at ``mark``."""
-        lines = text.count("\n")
-        column = len(text) - text.rfind("\n") if lines else mark.column + len(text)
-        return Mark(mark.file, mark.line + lines, column)
+        *before, last = lines_of(text)
+        return Mark(mark.file, mark.line + len(before), len(last) + (1 if before else mark.column))
 
     def _alias(self, anchor: str, mark: Mark) -> Node:
         if anchor in self._open:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from ligature.adf.lines import BREAKS, break_of, line_begin, line_end, next_line
 from ligature.adf.nodes import Mapping, Node, Scalar, Sequence, Span
 from ligature.adf.writer import Literal, entry_lines, flow_text, scalar_text, text_scalar
 
@@ -45,7 +46,7 @@ def apply(text: str, edits: Iterable[Edit]) -> str:
 
 def _outwards(text: str) -> tuple[int, bool]:
     """Sort key of lines inserted behind the same line: deeper indentation first, items of a list before keys."""
-    line = text.lstrip("\r\n")
+    line = text.lstrip(BREAKS)
     inner = line.lstrip(" ")
     return (len(inner) - len(line), not inner.startswith("-")) if line != text else (0, False)
 
@@ -86,7 +87,7 @@ def add_key(text: str, owner: Mapping, name: str, value: Any) -> Edit:
     if not owner.entries:
         raise PatchError(f"the block at {owner.mark} is empty, so nothing can be added to it")
     column = next(iter(owner.entries.values()))[0].mark.column - 1
-    at = _line_end(text, content_end(owner))
+    at = line_end(text, content_end(owner))
     return Edit((at, at), _lines(text, ["", *_indented(entry_lines(name, value), column)]))
 
 
@@ -103,9 +104,9 @@ def remove_key(text: str, owner: Mapping, name: str) -> Edit:
     following = owner.entries[names[position + 1]][0].span[0] if position + 1 < len(names) else None
     if owner.flow:
         return Edit(_without_comma(text, (start, end), following, position > 0), "")
-    begin = text.rfind("\n", 0, start) + 1
+    begin = line_begin(text, start)
     if not text[begin:start].strip():
-        return Edit((begin, _next_line(text, end)), "")
+        return Edit((begin, next_line(text, end)), "")
     if following is None:  # the only key of an item of a list
         return Edit((start, end), "{}")
     return Edit((start, following), "")
@@ -117,7 +118,7 @@ def add_item(text: str, items: Sequence, value: Any) -> Edit:
         at = len(text[: items.span[1] - 1].rstrip())
         separator = "" if not items.items else " " if text[at - 1] == "," else ", "
         return Edit((at, at), separator + flow_text(value))
-    at = _line_end(text, content_end(items))
+    at = line_end(text, content_end(items))
     dash = _dash(text, items.uses[-1][0])
     return Edit((at, at), _lines(text, ["", *_item_lines(text, dash, items.items[-1], value)]))
 
@@ -131,7 +132,7 @@ def insert_item(text: str, items: Sequence, index: int, value: Any) -> Edit:
     if items.flow:
         return Edit((start, start), flow_text(value) + ", ")
     dash = _dash(text, start)
-    begin = text.rfind("\n", 0, dash) + 1
+    begin = line_begin(text, dash)
     if text[begin:dash].strip():
         raise PatchError(f"the item at {items.items[index].mark} shares its line, so nothing can be inserted before it")
     return Edit((begin, begin), _lines(text, [*_item_lines(text, dash, items.items[index], value), ""]))
@@ -139,7 +140,7 @@ def insert_item(text: str, items: Sequence, index: int, value: Any) -> Edit:
 
 def _item_lines(text: str, dash: int, beside: Node, value: Any) -> list[str]:
     """The lines of an item of a list in blocks, whose dashes stand below the one at offset ``dash``."""
-    column = dash - (text.rfind("\n", 0, dash) + 1)
+    column = dash - line_begin(text, dash)
     if isinstance(beside, Mapping) and not beside.flow:
         return _indented(entry_lines("", [value])[1:], column)
     return [" " * column + "- " + flow_text(value)]
@@ -156,8 +157,8 @@ def remove_item(text: str, items: Sequence, index: int) -> Edit:
     if items.flow:
         following = items.uses[index + 1][0] if index + 1 < len(items.items) else None
         return Edit(_without_comma(text, (start, end), following, index > 0), "")
-    begin = text.rfind("\n", 0, _dash(text, start)) + 1  # the dash may stand on a line of its own
-    return Edit((begin, _next_line(text, end)), "")
+    begin = line_begin(text, _dash(text, start))  # the dash may stand on a line of its own
+    return Edit((begin, next_line(text, end)), "")
 
 
 def _dash(text: str, start: int) -> int:
@@ -269,21 +270,9 @@ def _without_comma(text: str, span: Span, following: int | None, has_previous: b
     return span
 
 
-def _line_end(text: str, offset: int) -> int:
-    """The end of the line that holds ``offset``, before its line break."""
-    end = text.find("\n", offset)
-    end = len(text) if end < 0 else end
-    return end - 1 if end > 0 and text[end - 1] == "\r" else end
-
-
-def _next_line(text: str, offset: int) -> int:
-    end = text.find("\n", offset)
-    return len(text) if end < 0 else end + 1
-
-
 def _lines(text: str, lines: list[str]) -> str:
     """Lines joined by the line break that ``text`` uses."""
-    return ("\r\n" if "\r\n" in text else "\n").join(lines)
+    return break_of(text).join(lines)
 
 
 def _indented(lines: list[str], column: int) -> list[str]:

@@ -16,6 +16,9 @@ import bisect
 import itertools
 import re
 from dataclasses import dataclass, field
+from operator import add
+
+from ligature.adf.lines import lines_and_breaks
 
 INDENT = 32
 """Spaces inserted before a line of a flow collection; more than any block mapping of a scene file has."""
@@ -42,7 +45,7 @@ class Relaxed:
 def relax(text: str) -> Relaxed:
     """``text`` with the lines inside flow collections indented, and tabs in empty lines and odd anchors replaced."""
     text, anchors = _renamed(_TABS.sub(lambda found: " " * len(found[0]), text))
-    lines = text.split("\n")
+    lines, breaks = lines_and_breaks(text)
     inserted: list[int] = []
     depth = 0
     opens_value = False
@@ -54,7 +57,7 @@ def relax(text: str) -> Relaxed:
         depth = _depth_after(line, depth)
         if stripped and not stripped.startswith("#"):
             opens_value = depth == 0 and _ends_open(stripped)
-    return Relaxed("\n".join(lines), inserted, anchors)
+    return Relaxed("".join(map(add, lines, breaks)), inserted, anchors)
 
 
 _TABS = re.compile(r"(?<![^\r\n])[ \t]*\t[ \t]*(?=[#\r\n]|\Z)")

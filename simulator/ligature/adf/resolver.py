@@ -16,6 +16,7 @@ from pathlib import Path
 
 from ligature.adf.diagnostics import AdfError, Diagnostic, Mark, Severity
 from ligature.adf.lacking import instead_of_url, lack_of
+from ligature.adf.lines import lines_of
 from ligature.adf.nodes import Node, Scalar, Sequence, parse
 from ligature.paths import check_list, open_file, real_path
 
@@ -155,7 +156,7 @@ class Resolver:
             return decoded(data)
         except UnicodeDecodeError as error:
             name = "-".join(error.encoding.upper().split("-")[:2])
-            before = data[: error.start].decode(error.encoding, "replace").lstrip("\ufeff").split("\n")
+            before = lines_of(data[: error.start].decode(error.encoding, "replace").lstrip("\ufeff"))
             place = Mark(Path(path), len(before), len(before[-1]) + 1)
             raise self._refusal(
                 f"'{path}' is not {name} text (byte {error.start})", place, "save it as UTF-8"

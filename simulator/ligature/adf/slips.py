@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from ligature.adf.lines import lines_of
+
 _BLANK = "[\u00a0\u2000-\u200b\u202f\u205f\u3000\ufeff]"
 """Characters that look like a blank, or like nothing, and are none for YAML."""
 
@@ -24,11 +26,6 @@ _REMEDIES = (
     ("could not find expected ':'", "write 'key: value'"),
 )
 """Beginnings of what the YAML library says, and what is right."""
-
-
-def lines_of(text: str) -> list[str]:
-    """The lines of ``text``, with the line ends of any system."""
-    return re.split("\r\n|\r|\n", text)
 
 
 def remedy(text: str, error: Any) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 from ligature.adf import nodes
 from ligature.adf.align import aligned
 from ligature.adf.document import Document, Element, own_element
+from ligature.adf.lines import BREAKS, break_of
 from ligature.adf.patch import (
     Edit,
     PatchError,
@@ -176,8 +177,8 @@ def _definition(text: str, item: Item) -> Edit:
     """The block of a new object, at the end of the file."""
     at = len(text)
     lines = entry_lines(item.key, {**_nested(item.kind, item.values), **item.extra})
-    line_break = "\r\n" if "\r\n" in text else "\n"
-    start = "" if text.endswith("\n") or not text else line_break
+    line_break = break_of(text)
+    start = "" if text[-1:] in (*BREAKS, "") else line_break
     return Edit((at, at), start + line_break.join((*lines, "")))
 
 

@@ -261,7 +261,7 @@ class _Reader:
 
 def _logical_lines(text: str) -> Iterator[tuple[int, str]]:
     """Number and text of each line; a line that ends in a backslash goes on in the next one."""
-    lines = text.split("\n" if "\n" in text else "\r")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if "\\" not in text:
         yield from enumerate(lines, 1)
         return

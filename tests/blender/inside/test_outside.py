@@ -107,8 +107,11 @@ def same_meshes(done, target):
     return count
 
 
-def test_meshes_that_lie_outside_come_below_the_folder_with_their_textures(tmp_path):
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"], ids=["Unix", "Windows", "old Mac"])
+def test_meshes_that_lie_outside_come_below_the_folder_with_their_textures(tmp_path, end):
     file = climbing(tmp_path)
+    for part in (tmp_path / "scene").rglob("part.*"):
+        part.write_bytes(part.read_bytes().replace(b"\n", end.encode()))
     done = import_file(file, bpy.context.scene)
     target = tmp_path / "X" / "a" / "b" / "c" / "mine.yaml"
     target.parent.mkdir(parents=True)
@@ -122,7 +125,8 @@ def test_meshes_that_lie_outside_come_below_the_folder_with_their_textures(tmp_p
     assert all(after[path] == data for path, data in before.items())
     expected = CLIMBING.replace("../../../meshes/tools/high_res/", "./high_res/")
     assert target.read_text() == expected.replace("../../../meshes/tools/low_res/", "./low_res/")
-    assert (target.parent / "high_res" / "part.mtl").read_text() == "newmtl skin\nKd 1 0 0\nmap_Kd red.png\n"
+    library = (target.parent / "high_res" / "part.mtl").read_bytes().decode()
+    assert library == end.join(["newmtl skin", "Kd 1 0 0", "map_Kd red.png", ""])
 
 
 def test_a_changed_mesh_that_lay_outside_is_written_beside_the_file_that_is_saved_in_place(tmp_path):
