@@ -30,6 +30,7 @@ from ligature.physics.bullet import (
     set_velocity,
     submit,
 )
+from ligature.physics.feedforward import find_efforts
 from ligature.physics.trees import (
     BASE_U,
     REST_SPEED,
@@ -70,6 +71,17 @@ or of what the spring exerts for 1 m or rad if that is less: springs of grains a
 
 No spring balances a weight to the last bit: what remains moves a joint by parts of a picometre, but for ever."""
 
+AT_STOP = 1e-6
+"""Distance in rad or m from its stop at which an axis rests on it.
+
+A motor that would take it farther beyond within a tick presses with all its strength."""
+
+OBEYED = 3e-3
+"""Difference in rad/s or m/s between an axis and its motor after a tick up to which nothing was in its way."""
+
+FORESEEN = 0.5
+"""Part of a motor's strength that is foreseen at most: with the rest it can still let go within the tick."""
+
 SERVO_GAIN = 200.0
 """Closing speed over following error in 1/s: the set-point is reached with a time constant of 5 ms."""
 
@@ -78,6 +90,7 @@ class Axes(NamedTuple):
     """The single axes of all trees, (a,) each, tree by tree, and what holds for trees (k,)."""
 
     laden: Flags  # (k,) whether the joints of a tree bear `Trees.force`
+    steered: Flags  # (k,) whether motors drive all axes of a tree whose base stands
     mode: Integers
     force_output: Flags
     turns: Flags
@@ -125,7 +138,7 @@ _KINDS = {
 def axes(trees: int, count: int) -> Axes:
     """Arrays for ``count`` axes of this number of trees, all limp."""
     arrays = {name: np.zeros(count, _KINDS.get(name, np.float64)) for name in Axes._fields}
-    arrays["laden"] = np.zeros(trees, np.bool_)
+    arrays["laden"], arrays["steered"] = np.zeros((2, trees), np.bool_)
     for name in ("max_velocity", "max_deceleration"):
         arrays[name][:] = np.inf
     arrays["mode"][:] = FREE
@@ -162,7 +175,12 @@ def act(handle: int, tree_table: Integers, axis_table: Integers, dt: float) -> N
             _bound(axes, trees, i, dt)
             if axes.sprung[i]:
                 _balance(axes, trees, i)
+        if axes.steered[k] and _foresee(axes, trees, k, dt):
+            efforts += 1
         trees.quiet[k] = trees.quiet[k] and _unchanged(axes, trees, k)
+        for i in range(begin, end):
+            if axes.driven[i]:
+                trees.last_motor[0, i], trees.last_motor[1, i] = axes.motor[i], axes.limit[i]
         if handle == 0 or (trees.quiet[k] and trees.still[k]):
             continue
         if motors > 0:
@@ -180,7 +198,33 @@ def _unchanged(axes: Axes, trees: Trees, k: int) -> bool:
             same = same and axes.motor[i] == trees.last_motor[0, i] and axes.limit[i] == trees.last_motor[1, i]
         if axes.pushed[i]:
             same = same and trees.push[i] == 0.0
+        same = same and trees.foreseen[i] == 0.0
     return same
+
+
+@inlined
+def _foresee(axes: Axes, trees: Trees, k: int, dt: float) -> bool:
+    """Find `Trees.foreseen` for the motors of tree ``k``, and leave the rest of their strength to Bullet.
+
+    An axis that did not follow its motor, as a jaw on what it grips, is taken to go on as it does. Returns whether
+    there is anything to foresee.
+    """
+    changes = False
+    for i in range(trees.first[k], trees.first[k + 1]):
+        obeys = abs(trees.joints[1, i] - trees.last_motor[0, i]) < OBEYED
+        trees.change[i] = axes.motor[i] - trees.joints[1, i] if obeys else 0.0
+        changes = changes or trees.change[i] != 0.0
+    if not changes:
+        return False
+    if not trees.linked[k]:
+        follow(trees, k)
+    find_efforts(trees, k, dt)
+    for i in range(trees.first[k], trees.first[k + 1]):
+        most, other = FORESEEN * axes.limit[i], trees.push[i] if axes.pushed[i] else 0.0
+        trees.foreseen[i] = min(max(trees.foreseen[i] - other, -most), most)
+        axes.limit[i] -= abs(trees.foreseen[i])
+        trees.push[i] = other + trees.foreseen[i]
+    return True
 
 
 @inlined
@@ -188,6 +232,7 @@ def _follow_law(axes: Axes, trees: Trees, k: int, dt: float) -> None:
     """Motor velocity and effort of one axis by its command and spring; advances its integral and its kick."""
     position, velocity = trees.joints[0, k], trees.joints[1, k]
     axes.motor[k] = axes.asked[k] = trees.push[k] = 0.0
+    trees.foreseen[k] = trees.pressed[k] = 0.0
     if axes.mode[k] == POSITION:
         error = axes.target[k] - position
         if axes.turns[k]:
@@ -273,6 +318,24 @@ def _bound(axes: Axes, trees: Trees, k: int, dt: float) -> None:
         if not axes.slowed[k]:
             limit = strength
     axes.limit[k] = limit
+    _keep_within_stops(axes, trees, k, dt)
+
+
+@inlined
+def _keep_within_stops(axes: Axes, trees: Trees, k: int, dt: float) -> None:
+    """Ask a motor for no more than what takes its axis to its stop, and note how it presses on one.
+
+    Bullet stops only an axis that is beyond already: one a bit before would be thrown through its stop, and back.
+    """
+    position, wanted = trees.joints[0, k], axes.motor[k]
+    down, up = axes.low[k] - position, axes.high[k] - position
+    lowest = 0.0 if -AT_STOP < down < 0.0 else down / dt
+    highest = 0.0 if 0.0 < up < AT_STOP else up / dt
+    axes.motor[k] = min(max(wanted, lowest), highest)
+    if abs(down) < AT_STOP and wanted * dt < down - AT_STOP:
+        trees.pressed[k] = -axes.limit[k]
+    elif abs(up) < AT_STOP and wanted * dt > up + AT_STOP:
+        trees.pressed[k] = axes.limit[k]
 
 
 @inlined
@@ -332,7 +395,6 @@ def _send_motors(handle: int, trees: Trees, axes: Axes, k: int) -> None:
             set_velocity(command, at, axes.motor[i])
             set_gain(command, at, VELOCITY_GAIN)
             set_strength(command, at, axes.limit[i])
-            trees.last_motor[0, i], trees.last_motor[1, i] = axes.motor[i], axes.limit[i]
     submit(handle, command)
 
 
@@ -342,6 +404,6 @@ def _send_efforts(handle: int, trees: Trees, axes: Axes, k: int) -> None:
     begin, end = trees.first[k], trees.first[k + 1]
     command = init_motors(handle, trees.uid[k], TORQUE_CONTROL)
     for i in range(begin, end):
-        if axes.pushed[i]:
+        if axes.pushed[i] or trees.foreseen[i] != 0.0:
             set_effort(command, BASE_U + i - begin, trees.push[i])
     submit(handle, command)

@@ -73,10 +73,10 @@ class TreeControl:
         owners = [joints[joint] for _, joint, _, _ in tree.axes]
         self.links = [link for link, *_ in tree.axes]
         self.row = {joint: i for i, (_, joint, _, _) in enumerate(tree.axes)}
-        self._laden = everything.laden[index : index + 1]
+        self._laden, self._steered = (flags[index : index + 1] for flags in (everything.laden, everything.steered))
         rows = motions.slices[index]
         self.first_axis = rows.start
-        own = self.axes = Axes._make([self._laden, *(array[rows] for array in everything[1:])])
+        own = self.axes = Axes._make([self._laden, self._steered, *(array[rows] for array in everything[2:])])
         own.p[:] = [j.controller.p for j in owners]
         own.i[:] = [j.controller.i for j in owners]
         own.d[:] = [j.controller.d for j in owners]
@@ -252,7 +252,8 @@ class TreeControl:
 
     def send(self) -> None:
         """Have PyBullet take motors and efforts of this tick, where compiled code cannot."""
-        own, uid, motors, efforts = self.axes, self.tree.uid, *map(np.flatnonzero, (self.axes.driven, self.axes.pushed))
+        acted = self.axes.pushed | (self._motions.trees.foreseen[self._motions.slices[self._index]] != 0.0)
+        own, uid, motors, efforts = self.axes, self.tree.uid, *map(np.flatnonzero, (self.axes.driven, acted))
         links = np.array(self.links)
         if len(motors):
             pybullet.setJointMotorControlArray(
@@ -280,6 +281,7 @@ class TreeControl:
                 self.tree.uid, idle, pybullet.VELOCITY_CONTROL, forces=[0.0] * len(idle), physicsClientId=self._client
             )
         own.driven[:], own.pushed[:] = by_motor, by_effort
+        self._steered[0] = self.tree.static and by_motor.all()
         self._motions.drive(self._index, by_motor)
 
     def snapshot(self) -> dict[str, Any]:

@@ -89,6 +89,8 @@ class Motions:
     def drive(self, tree: int, driven: NDArray[np.bool_]) -> None:
         """From now on motors drive the axes of a tree that are ``driven``: Bullet keeps the last effort of a motor."""
         self.trees.limp[self.slices[tree]] = ~driven
+        for beside in (self.trees.foreseen, self.trees.pressed):
+            beside[self.slices[tree]] *= driven
         self.rouse(tree)
 
     def send(self, axis: int, effort: float | None) -> None:
@@ -137,6 +139,7 @@ class Motions:
     def begin(self) -> None:
         """No tick is over yet, so that no motor has an effort and no joint a reaction: Bullet has those of before."""
         self.trees.ticks[0] = 0
+        self.trees.last_motor[:] = np.nan
         self.forget_all()
 
     def forget(self, tree: int) -> None:
@@ -201,7 +204,8 @@ class Motions:
             states = pybullet.getJointStates(self._uids[tree], links, physicsClientId=self._client)
             self.position[rows], self.velocity[rows], reaction, effort = zip(*states, strict=True)
             silent = (arrays.ticks[0] == 0) | arrays.limp[rows]
-            self.effort[rows] = np.where(arrays.sent[rows], arrays.sent_effort[rows], np.where(silent, 0.0, effort))
+            whole = np.where(silent, 0.0, effort + arrays.foreseen[rows] + arrays.pressed[rows])
+            self.effort[rows] = np.where(arrays.sent[rows], arrays.sent_effort[rows], whole)
             if arrays.measured[tree]:
                 arrays.reaction[rows] = np.zeros(6) if arrays.ticks[0] == 0 else reaction
         arrays.read[tree] = True

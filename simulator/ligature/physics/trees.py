@@ -89,6 +89,8 @@ class Trees(NamedTuple):
     limp: Flags  # (a,) whether no motor drives it
     sent: Flags  # (a,) whether it reports another effort than its motor's, and that
     sent_effort: Array  # (a,)
+    foreseen: Array  # (a,) part of a motor's effort that is known before Bullet solves for the rest
+    pressed: Array  # (a,) effort with which a motor presses its axis on a stop; no other part of the tree feels it
     rows: Integers  # (r, 3) parent row, type and axis of the joint
     fixed: Array  # (r, 17) axis of the joint, link frame in its parent's at zero, inertial frame in the link frame
     far: Array  # (r,) how far anything that its joint moves is from that at most, with sliding joints beyond at 0
@@ -103,6 +105,8 @@ class Trees(NamedTuple):
     force: Array  # (r, 3) at the centres of mass
     load: Array  # (r, 6) scratch: force, and moment about the world's origin
     push: Array  # (a,)
+    change: Array  # (a,) scratch: what motors are to add to velocities
+    acceleration: Array  # (r, 6) scratch: of the link frames' origins
     before: Array  # (a,) scratch: positions before a tick
     last_motor: Array  # (2, a) velocity and largest effort of the motors that Bullet has; NaN before it has any
     answer: Integers  # (5,) its own address, and where Bullet puts what `read_tree` asks for
@@ -122,9 +126,11 @@ def trees(count: int, rows: int, axes: int, sleepers: int = 0, compared: Boxes |
         quiet=z(count, no), still=z(count, no), asleep=z(count, no), sleepers=z(sleepers, whole),
         sleepers_begin=z(count + 1, whole), before=z(axes), last_motor=np.full((2, axes), np.nan),
         link=z(axes, whole), middle=z(axes, whole), limp=np.ones(axes, no), sent=z(axes, no), sent_effort=z(axes),
+        foreseen=z(axes), pressed=z(axes),
         rows=np.full((rows, 3), -1), fixed=z((rows, 17)), far=np.full(rows, np.inf), mass=z(rows), inertia=z((rows, 3)),
         pose=z((rows, 7)), twist=z((rows, 6)), frame=z((rows, 7)), speed=z((rows, 6)), joints=z((3, axes)),
-        reaction=z((axes, 6)), force=z((rows, 3)), load=z((rows, 6)), push=z(axes), answer=answer,
+        reaction=z((axes, 6)), force=z((rows, 3)), load=z((rows, 6)), push=z(axes), change=z(axes),
+        acceleration=z((rows, 6)), answer=answer,
         wanted=wanted, wanted_at=np.array([wanted.ctypes.data]), boxes=compared or boxes(count),
     )  # fmt: skip
 
@@ -151,7 +157,8 @@ def read_tree(handle: int, trees: Trees, k: int) -> None:
         trees.joints[0, i] = real_at(q, BASE_Q + i - first)
         trees.joints[1, i] = real_at(u, BASE_U + i - first)
         silent = trees.ticks[0] == 0 or trees.limp[i]
-        trees.joints[2, i] = trees.sent_effort[i] if trees.sent[i] else 0.0 if silent else real_at(efforts, link)
+        effort = 0.0 if silent else real_at(efforts, link) + trees.foreseen[i] + trees.pressed[i]
+        trees.joints[2, i] = trees.sent_effort[i] if trees.sent[i] else effort
         if trees.measured[k]:
             for a in range(6):
                 trees.reaction[i, a] = 0.0 if trees.ticks[0] == 0 else real_at(reactions, 6 * link + a)
@@ -506,14 +513,20 @@ def _carried(twist: Array, rx: float, ry: float, rz: float, out: Array) -> None:
 @inlined
 def load_joints(trees: Trees, k: int) -> None:
     """Add to ``push`` what the forces on the links of tree ``k``, which are up to date, do to its joints."""
-    rows, fixed, frame, pose = trees.rows, trees.fixed, trees.frame, trees.pose
-    force, load, effort = trees.force, trees.load, trees.push
-    begin, end = trees.begin[k], trees.begin[k + 1]
-    for r in range(begin, end):
+    force, load, pose = trees.force, trees.load, trees.pose
+    for r in range(trees.begin[k], trees.begin[k + 1]):
         x, y, z = force[r, 0], force[r, 1], force[r, 2]
         cx, cy, cz = pose[r, 0], pose[r, 1], pose[r, 2]
         load[r, 0], load[r, 1], load[r, 2] = x, y, z
         load[r, 3], load[r, 4], load[r, 5] = cy * z - cz * y, cz * x - cx * z, cx * y - cy * x
+    bear(trees, k, trees.push)
+
+
+@inlined
+def bear(trees: Trees, k: int, effort: Array) -> None:
+    """Add to ``effort`` (a,) what `Trees.load` does to the joints of tree ``k``; loads of links add up to the base."""
+    rows, fixed, frame, load = trees.rows, trees.fixed, trees.frame, trees.load
+    begin, end = trees.begin[k], trees.begin[k + 1]
     for r in range(end - 1, begin, -1):
         p, kind, joint = rows[r, 0], rows[r, 1], rows[r, 2]
         if joint >= 0:
