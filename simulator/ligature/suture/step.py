@@ -39,9 +39,11 @@ MAX_SWING = 0.5
 
 @kernel
 def predict(total: int, nodes: Nodes, work: Work, dt: float, damped: bool) -> None:
-    """Free motion: start poses to ``work.x``, predicted poses to ``nodes`` and ``work.xp``.
+    """Start poses to ``work.x``, those after free motion to ``work.xp``; ``nodes`` go on as before.
 
-    Damping of a whole tick is taken off in its ``damped`` step.
+    Newton's method begins without the fall by gravity: of what lies on something, contacts take it all up, and friction
+    would see the nodes slide down any slope that they fall into. Damping of a whole tick is taken off in its ``damped``
+    step.
     """
     for i in range(total):
         if not nodes.met[i]:
@@ -49,11 +51,13 @@ def predict(total: int, nodes: Nodes, work: Work, dt: float, damped: bool) -> No
         slow, still = (nodes.keep[i, 0], nodes.keep[i, 1]) if damped else (1.0, 1.0)
         for a in range(3):
             work.x[i, a] = nodes.x[i, a]
+            fall = 0.0
             if not nodes.fixed[i]:
-                nodes.v[i, a] = nodes.v[i, a] * slow + dt * nodes.gravity[i, a]
+                nodes.v[i, a] *= slow
                 nodes.w[i, a] *= still
+                fall = dt * dt * nodes.gravity[i, a]
             nodes.x[i, a] += dt * nodes.v[i, a]
-            work.xp[i, a] = nodes.x[i, a]
+            work.xp[i, a] = nodes.x[i, a] + fall
         for a in range(4):
             work.q[i, a] = nodes.q[i, a]
         turn(nodes.q, i, dt * nodes.w[i, 0], dt * nodes.w[i, 1], dt * nodes.w[i, 2])
