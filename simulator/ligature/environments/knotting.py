@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 
 MIRRORED = np.array([-1.0, 1.0, 1.0])
 
+TRIES = 3
+"""How often it makes the second throw at most, while the left hand has the long end."""
+
 BEHIND = np.array([-0.009, 0.009, 0.028]), np.array([-0.009, 0.009, 0.004])
 """Where the right tool comes down behind it, on the side of the vessel."""
 
@@ -85,6 +88,9 @@ class Knotter(Tier):
     LOCKED = 2.0
     """Newtons with which both hands stop to draw the ends apart."""
 
+    TIGHT = np.inf
+    """Newtons with which the second throw is drawn at most, before the short end is in a hand."""
+
     def knot(self) -> Iterator[Array]:
         """All of the knot, both of its ends drawn, each in a hand."""
         yield from self.first()
@@ -94,10 +100,17 @@ class Knotter(Tier):
         yield from self.draw_apart()
 
     def second(self) -> Iterator[Array]:
-        """The second throw, up to where the right hand has drawn the end through it."""
-        yield from self.hook()
-        yield from self.under()
-        yield from self.back_through()
+        """The second throw, up to where the right hand has drawn the end through it; a missed one is made again."""
+        for left in reversed(range(TRIES)):
+            try:
+                yield from self.hook()
+                yield from self.under()
+                yield from self.back_through()
+                return
+            except Missed:
+                if not left:
+                    raise
+                yield from self.leave(RIGHT)
 
     def at(self, way: Array, along: Array, place: Array) -> Array:
         """Pose (4, 4) of a tool with the thread at a place that is given from the vessel."""
@@ -140,7 +153,7 @@ class Knotter(Tier):
         along = OUT if OUT @ self.hands[RIGHT].tool[:3, 0] > 0.0 else -OUT
         for *place, most in DRAWN:
             T = self.at(PULLED, along, np.array(place))
-            yield from self.go(RIGHT, T, SHUT, SLOW, lambda most=most: self.pull(RIGHT) > most)  # type: ignore[misc]
+            yield from self.go(RIGHT, T, SHUT, SLOW, lambda most=most: self.pull(RIGHT) > min(most, self.TIGHT))  # type: ignore[misc]
 
     def take_short_end(self) -> Iterator[Array]:
         """The left hand lifts the short end out of its clip, and brings it to its own side."""
