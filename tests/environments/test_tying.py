@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ligature.environments.goals import FirstThrow, KnotTie
 from ligature.environments.goals.ligating import LYING, Ligating
+from ligature.environments.knotting import TRIES, Knotter
 from ligature.environments.suturing import _scene
-from ligature.environments.tying import shorter
+from ligature.environments.tying import Missed, shorter
 from ligature.model.frames import frame
 from scipy.spatial.transform import Rotation
 
@@ -134,3 +135,41 @@ def test_of_two_grasps_half_a_turn_apart_a_hand_takes_the_one_that_turns_it_less
     assert min(np.abs(found - one).max() for one in (T, turned)) < 1e-12
     least, *others = (Rotation.from_matrix(tool[:3, :3].T @ one[:3, :3]).magnitude() for one in (found, T, turned))
     assert least <= min(others) + 1e-9
+
+
+class Clumsy(Knotter):
+    """Misses the second throw so many times."""
+
+    def __init__(self, misses: int) -> None:
+        self.misses, self.done = misses, ""
+
+    def hook(self) -> Iterator[np.ndarray]:
+        yield from self._do("hook ")
+
+    def under(self) -> Iterator[np.ndarray]:
+        yield from self._do("under ")
+
+    def back_through(self) -> Iterator[np.ndarray]:
+        yield from self._do("through ")
+        self.misses -= 1
+        if self.misses >= 0:
+            raise Missed("the loop is not around the tool")
+
+    def leave(self, number: int) -> Iterator[np.ndarray]:
+        yield from self._do("leave ")
+
+    def _do(self, name: str) -> Iterator[np.ndarray]:
+        self.done += name
+        yield np.zeros(14)
+
+
+@pytest.mark.parametrize("misses", range(TRIES))
+def test_a_missed_second_throw_is_made_again(misses: int) -> None:
+    knotter = Clumsy(misses)
+    assert len(list(knotter.second())) == 4 * misses + 3
+    assert knotter.done == "hook under through leave " * misses + "hook under through "
+
+
+def test_a_second_throw_that_is_missed_every_time_is_reported() -> None:
+    with pytest.raises(Missed, match="not around the tool"):
+        list(Clumsy(TRIES).second())
