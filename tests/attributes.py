@@ -187,7 +187,9 @@ CACHES: dict[str, str] = {
     "Trees.before": "scratch",
     "Trees.quiet": "a restore rouses all trees; the next tick decides anew",
     **dict.fromkeys(("Trees.still", "Trees.asleep"), "decided anew by every tick, for trees that are quiet"),
-    "Trees.last_motor": "read for trees that are quiet alone: others are sent their motors",
+    "Trees.last_motor": "unknown after a restore, also in the simulation that took the snapshot",
+    **dict.fromkeys(("Trees.foreseen", "Trees.pressed"), "part of an effort, which nobody has before the next tick"),
+    **dict.fromkeys(("Trees.change", "Trees.acceleration"), "scratch"),
     **dict.fromkeys(
         (
             "Engine.client",

@@ -206,7 +206,7 @@ def _unchanged(axes: Axes, trees: Trees, k: int) -> bool:
 def _foresee(axes: Axes, trees: Trees, k: int, dt: float) -> bool:
     """Find `Trees.foreseen` for the motors of tree ``k``, and leave the rest of their strength to Bullet.
 
-    An axis that did not follow its motor, as a jaw on what it grips, is taken to go on as it does. Returns whether
+    An axis that did not follow its motor, as a jaw on what it holds, is taken to go on as it does. Returns whether
     there is anything to foresee.
     """
     changes = False
