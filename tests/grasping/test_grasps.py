@@ -55,10 +55,10 @@ def test_a_needle_pulled_harder_than_the_law_allows_slips_against_the_limiting_f
     T = sim.grasps.patch("PSM1")
     slip, force = sim.grasps["PSM1"].slip.copy(), 0.0
     while sim.grasps["PSM1"].slip[0] < slip[0] + 0.1e-3:
-        force += 0.02
+        force += 0.01
         push = force * T[:3, 0]
         held.needle.command_wrench(np.r_[push, np.cross(T[:3, 3] - world.motion(index)[0][:3], push)])
-        sim.step(2)
+        sim.step()  # it slips by more than a millimetre within one tick, and is slower in the next
         assert force < 1.2 * limit, "it never slips"
     assert force == pytest.approx(limit, rel=0.02)
     pulled = np.linalg.norm(sim.grasps["PSM1"].wrench[:3])
