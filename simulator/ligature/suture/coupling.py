@@ -25,8 +25,10 @@ Array = NDArray[np.float64]
 MAX_SWITCHES = 3
 """Switches between stick and slip after which a contact yields for the rest of the tick."""
 
-STICTION = 1.001
-"""Force, over the friction limit, at which a contact that stuck starts to slip."""
+TOLERANCE = 0.02
+"""Share of the friction limit by which a solve may miss Coulomb's law: sticking above the limit, slipping below it.
+
+Contacts of a thread that creeps are all near their limits, and would take turns in sticking and slipping for ever."""
 
 PRESSURE = 0.1
 """Change of the normal force, as a share of it, that a solve with the old friction limit may leave."""
@@ -264,7 +266,7 @@ def _settle_friction(touches: Touches, c: int, w: Array, press: float, stiffness
     size = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     force = size * stiffness
     if touches.mode[c] == FrictionMode.STICKS:
-        if force <= limit * STICTION:
+        if force <= (1.0 + TOLERANCE) * limit:
             return False
         touches.switches[c] += 1
         touches.mode[c] = FrictionMode.SLIPS if touches.switches[c] < MAX_SWITCHES else FrictionMode.YIELDS
@@ -272,11 +274,11 @@ def _settle_friction(touches: Touches, c: int, w: Array, press: float, stiffness
     begun = touches.begun[c]
     first = math.sqrt(begun[0] ** 2 + begun[1] ** 2 + begun[2] ** 2)
     onward = (begun[0] * w[0] + begun[1] * w[1] + begun[2] * w[2]) / first if first > 0.0 else 0.0
-    if touches.mode[c] == FrictionMode.SLIPS and onward * stiffness < limit:
+    if touches.mode[c] == FrictionMode.SLIPS and onward * stiffness < (1.0 - TOLERANCE) * limit:
         touches.switches[c] += 1
         touches.mode[c] = FrictionMode.STICKS if touches.switches[c] < MAX_SWITCHES else FrictionMode.YIELDS
         return True
-    return onward < 0.98 * size or abs(limit - before) > PRESSURE * limit
+    return onward < (1.0 - TOLERANCE) * size or abs(limit - before) > PRESSURE * limit
 
 
 @kernel
