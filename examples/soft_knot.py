@@ -3,9 +3,10 @@
 In the scene `soft_knot` a thread is already stitched through both lips of a wound that gapes, its short end in a clip.
 The program makes the throws of the expert of `ligature/KnotTie-v0`, with other places: the first throw is drawn just
 until it lies on the tissue, since one that is drawn hard locks too far above it; the second throw stays loose, so that
-the short end slides through both until the wound is closed; then both ends drawn apart lock the knot. It finds its way
-by the ground truth of the simulation. Run it with ``--help``. World axes, metres, radians, newtons, seconds of
-simulated time.
+the short end slides through both until the wound is closed; then both ends drawn apart lock the knot. The hands ease
+both ends and look: where the wound opens again, they slide and lock the knot once more. The program finds its way by
+the ground truth of the simulation. Run it with ``--help``. World axes, metres, radians, newtons, seconds of simulated
+time.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import numpy as np
 from ligature.environments.actions import ArmActions
 from ligature.environments.goals.ligating import LEFT, RIGHT, Ligating, holding
 from ligature.environments.hand import SHUT, Hand
-from ligature.environments.knotting import APART, BEYOND, SLOWEST, Knotter
+from ligature.environments.knotting import BEYOND, SLOWEST, Knotter
 from ligature.environments.layout import ACTION
 from ligature.environments.reading import ArmReading
 from ligature.environments.tying import AWAY, DRAW, SLOW, Missed
@@ -66,15 +67,25 @@ ENDS, WAY = (3, 12), np.array([-0.2, 0.97, 0.05])
 OFFERED = np.array([0.005, 0.0255, -0.008])
 """Where the left hand offers the free end to the right one, below the short end, from the vessel."""
 
-SLID, GIVEN = np.array([-0.080, 0.022, 0.005]), np.array([0.020, 0.0, 0.005])
-"""Where the left hand draws the short end, and to where the right one yields the long end meanwhile."""
+FAR = np.array([0.095, -0.008, 0.005]), np.array([-0.100, 0.022, 0.005])
+"""Where the right and the left hand draw both ends: so far that a stretched end is taut before."""
 
-KEPT, SNUG, MEETING = (0.15, 0.25), 3.0, 5e-5
-"""Newtons between which the right hand keeps the long end meanwhile; newtons with which the short end is drawn until
-the lips meet, and width of the wound then: what is too short springs back when the hands let go."""
+GIVEN, KEPT = np.array([0.020, 0.0, 0.005]), (0.15, 0.25)
+"""To where the right hand yields the long end while the short one slides; newtons between which it keeps it."""
 
-TIMES, MOST = 2, 300
-"""How often the knot is slid and locked, and actions of a slide at most."""
+SNUG, HARDER, MEETING = 3.0, 1.5, 5e-5
+"""Newtons with which the short end is drawn until the lips meet, and how many more each further time: what is too
+short springs back when the ends are slack; width of the wound where the lips meet."""
+
+EASED = np.array([0.030, 0.0, 0.008]), np.array([-0.028, 0.014, 0.005])
+"""Towards where the right and the left hand ease their ends."""
+
+SLACK, EVEN, LOOSE = 0.05, 0.8, 15
+"""Newtons below which an end is slack; share of the other end's tension above which a hand eases its own; actions by
+which both hands go on once both ends are slack."""
+
+TIMES, MOST = 6, 300
+"""How often the knot is slid and locked at most, and actions of a slide, of a lock and of easing at most."""
 
 DISPLACED = np.array([-0.0015, 0.0010, 0.0])
 """Where the first throw then lies, from where it would lie at the vessel."""
@@ -151,30 +162,61 @@ class Knotting(Knotter):
         return pull > TAUT and length < CLOSE
 
     def draw_apart(self) -> Iterator[Array]:
-        """The short end slides through both throws until the wound is closed; then both ends lock the knot."""
-        for _ in range(TIMES):
-            yield from self.slide()
-            yield from super().draw_apart()
+        """Slide and lock the knot until it holds the wound closed by itself, both ends slack in the hands."""
+        goal = self.goal
+        assert isinstance(goal, Sewn)
+        for count in range(TIMES):
+            yield from self.slide(goal, min(SNUG + count * HARDER, self.LOCKED))
+            yield from self.lock()
+            yield from self.ease()
+            if goal.gap() < MEETING and self.slack():  # taut ends would keep the lips shut
+                return
 
-    def slide(self) -> Iterator[Array]:
+    def slide(self, goal: Sewn, most: float) -> Iterator[Array]:
         """The left hand draws the short end, while the right one keeps the long end just taut: the knot does not lock.
 
         Both ends drawn at once would lock it before the wound is closed.
         """
-        goal = self.goal
-        assert isinstance(goal, Sewn)
         for _ in range(MOST):
             short, long = self.pull(LEFT), self.pull(RIGHT)
-            if goal.gap() < MEETING and short > SNUG > 2.0 * long:
+            if goal.gap() < MEETING and short > most > 2.0 * long:
                 return
-            action, left = self.hands[LEFT].action(self.turned(LEFT, SLID), SHUT)
+            action, left = self.towards(LEFT, FAR[LEFT])
             if left < 0.2:  # it can draw no further
                 return
-            action *= SLOWEST * (short < SNUG)
+            action *= short < most
             if not KEPT[0] < long < KEPT[1]:
-                place = APART[RIGHT] if long < KEPT[0] else GIVEN
-                action += SLOWEST * self.hands[RIGHT].action(self.turned(RIGHT, place), SHUT)[0]
+                action += self.towards(RIGHT, FAR[RIGHT] if long < KEPT[0] else GIVEN)[0]
             yield action
+
+    def lock(self) -> Iterator[Array]:
+        """Each hand draws its end until both bear at once what locks the knot."""
+        for _ in range(MOST):
+            loose = [n for n in (RIGHT, LEFT) if self.pull(n) < self.LOCKED]
+            ways = [self.towards(n, FAR[n]) for n in loose]
+            if all(left < 0.2 for _, left in ways):  # also where none is loose
+                return
+            yield np.sum([action for action, _ in ways], axis=0)
+
+    def ease(self) -> Iterator[Array]:
+        """Both hands ease their ends to slack, evenly: where one is slack while the other is taut, the knot slides."""
+        loose = 0
+        for _ in range(MOST):
+            pulls, slack = [self.pull(n) for n in (RIGHT, LEFT)], self.slack()
+            loose += slack
+            if loose > LOOSE:
+                return
+            giving = [n for n in (RIGHT, LEFT) if slack or pulls[n] > EVEN * max(pulls)]
+            yield np.sum([self.towards(n, EASED[n])[0] for n in giving], axis=0)
+
+    def slack(self) -> bool:
+        """Whether both ends are slack."""
+        return max(self.pull(RIGHT), self.pull(LEFT)) < SLACK
+
+    def towards(self, number: int, place: Array) -> tuple[Array, float]:
+        """A slow action of a hand towards a place that is given from the vessel, and how many full ones are left."""
+        action, left = self.hands[number].action(self.turned(number, place), SHUT)
+        return SLOWEST * action, left
 
 
 class Theatre:
@@ -218,8 +260,8 @@ class Outcome:
     kind
         Determinant, signature and three-colourings of the knot in the thread, its ends continued straight.
     gaps
-        Width of the wound at the stitch in metres: at first, with both ends drawn, when the hands have let go, and
-        `HOLDS` seconds later.
+        Width of the wound at the stitch in metres: at first, with both ends slack in the hands, when those have let
+        go, and `HOLDS` seconds later.
     sewn, hands_empty
         Whether the thread still passes through both lips, and no jaw holds anything.
     time
@@ -245,7 +287,7 @@ class Outcome:
 
     def lines(self) -> list[str]:
         """One figure a line."""
-        names = ["at first", "both ends drawn", "hands let go", f"{HOLDS} s later"]
+        names = ["at first", "both ends slack", "hands let go", f"{HOLDS} s later"]
         if self.stopped:
             names[len(self.gaps) - 1 :] = ["when it stopped"]
         determinant, signature, colourings = self.kind
