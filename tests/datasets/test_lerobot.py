@@ -77,8 +77,9 @@ def source(simulation: ligature.Simulation, tmp_path_factory: pytest.TempPathFac
 
 
 @pytest.fixture(scope="module", params=FORMATS)
-def exported(request: pytest.FixtureRequest, source: Path) -> Path:
-    target = source.parent / request.param
+def exported(request: pytest.FixtureRequest, source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    # workers that share tests out may come back to a format
+    target = tmp_path_factory.mktemp("exports") / request.param
     export(source, target, request.param, log=lambda _: None)
     return target
 
