@@ -18,10 +18,11 @@ import numpy as np
 from ligature.environments.suturing import CONTROL
 
 from tests.bench import ledger
-from tests.bench.reference import chain_step_us
-from tests.bench.resets import median_ms
+from tests.bench.reference import Reference
+from tests.bench.resets import median
 
-SECONDS, SPANS = 10.0, 5
+SECONDS, SPAN = 10.0, 0.1
+"""Seconds of a measurement, and of a span after which the reference is timed."""
 MAX_STEPS = 100
 
 
@@ -49,7 +50,7 @@ def rate(name: str, processes: int, seconds: float) -> float:
 
 
 class Spans(NamedTuple):
-    """What one process does: medians over spans, each measured right after the reference."""
+    """What one process does: medians over spans, in turn with which the reference is timed."""
 
     of_wall: float
     """Steps for each second of the wall."""
@@ -61,31 +62,32 @@ class Spans(NamedTuple):
     reset_ms: float
     """Milliseconds of a reset."""
     reset_ratio: float
-    """Wall time of a reset over that of a step of the reference."""
+    """Processor time of a reset over that of a step of the reference."""
 
 
-def alone(name: str, seconds: float) -> Spans:
+def alone(name: str, seconds: float, reference: Reference) -> Spans:
     """Steps with random actions, resets included, in this process, over ``seconds`` in all."""
     env, rng = made(name), np.random.default_rng(0)
+
+    def act() -> bool:
+        *_, done, cut, _ = env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32))
+        return bool(done or cut)
+
     env.reset(seed=0)
-    found = []
-    for _ in range(SPANS):
-        references = chain_step_us(), chain_step_us(clock="process_time")
+    totals, ratios = np.zeros(3), []
+    while totals[1] < seconds:
         steps, begin, spent = 0, time.perf_counter(), time.process_time()
-        while time.perf_counter() - begin < seconds / SPANS:
-            *_, done, cut, _ = env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32))
+        while time.perf_counter() - begin < SPAN:
             steps += 1
-            if done or cut:
+            if act():
                 env.reset()
-        wall, spent = time.perf_counter() - begin, time.process_time() - spent
-        ratios = 1e6 * wall / steps / references[0], 1e6 * spent / steps / references[1]
-        found.append((steps / wall, steps / spent, *ratios))
-    reset = median_ms(
-        env.reset, lambda: [env.step(rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)) for _ in range(10)]
-    )
+        span = np.array([steps, time.perf_counter() - begin, time.process_time() - spent])
+        totals += span
+        ratios.append(1e6 * span[1:] / steps / reference.time())
+    reset = median(env.reset, lambda: [act() for _ in range(10)], reference)
     env.close()
-    of_wall, of_processor, ratio, ratio_of_processor = (float(median) for median in np.median(found, axis=0))
-    return Spans(of_wall, of_processor, ratio, ratio_of_processor, reset, 1e3 * reset / references[0])
+    rates, medians = totals[0] / totals[1:], np.median(ratios, axis=0)
+    return Spans(float(rates[0]), float(rates[1]), float(medians[0]), float(medians[1]), *reset)
 
 
 def main() -> int:
@@ -94,7 +96,9 @@ def main() -> int:
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
     load = os.getloadavg()[0]
     for name in sorted(name for name in gymnasium.registry if name.startswith("ligature/")):
-        one, two = alone(name, seconds), rate(name, 2, seconds)
+        with Reference() as reference:
+            one = alone(name, seconds, reference)
+        two = rate(name, 2, seconds)
         found[name] = {
             "steps_per_second": one.of_wall, "real_time_factor": one.of_wall * CONTROL,
             "real_time_factor_of_processor": one.of_processor * CONTROL, "two_processes": two * CONTROL,

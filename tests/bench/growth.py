@@ -1,12 +1,13 @@
 """How the time of a tick grows with arms, bodies and elements of a thread: ``python -m tests.bench.growth``.
 
-Scenes are generated; the reference loop runs before each. Writes ``build/bench.json`` and
+Scenes are generated; the reference loop runs in turn with each. Writes ``build/bench.json`` and
 ``docs/pictures/bench_growth.png``.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import statistics
 import sys
 import tempfile
 from collections.abc import Callable
@@ -14,14 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import ligature
-from ligature.cli.bench import measure
+from ligature.cli.bench import Run
 from ligature.model.scene import Scene
 
 from tests.bench import ledger
-from tests.bench.reference import chain_step_us
+from tests.bench.reference import Reference, ratio
 
 ROOT = ledger.ROOT
-SECONDS, RATE = 1.0, 200.0
+SPANS, SECONDS, RATE = 30, 0.05, 200.0
+"""Spans of each run, seconds of each, and updates a second; the reference is timed after each span."""
 SERIES = {"arms": (0, 1, 2, 3, 4), "bodies": (10, 30, 100, 300, 1000), "elements": (40, 80, 160, 400)}
 APART = 1.5
 """Metres between arms that are added, so that they do not touch."""
@@ -97,12 +99,12 @@ def bodies(count: int, folder: Path) -> Scene:
     return ligature.load(path)
 
 
-def tick_us(make: Callable[[int, Path], Scene], count: int) -> tuple[float, float]:
-    """Microseconds of a median tick, and of a step of the reference."""
+def tick_us(make: Callable[[int, Path], Scene], count: int, reference: Reference) -> tuple[float, float]:
+    """Microseconds of a median tick, and the median of a tick over a step of the reference."""
     with tempfile.TemporaryDirectory() as folder:
-        reference = chain_step_us()
-        figures = measure(make(count, Path(folder)), SECONDS, RATE)
-    return float(figures["tick_p50_us"]), reference
+        run = Run(make(count, Path(folder)), RATE)
+    spans = [(1e6 * statistics.median(run.go_on(SECONDS)), reference.time().wall) for _ in range(SPANS)]
+    return float(run.figures()["tick_p50_us"]), ratio(spans)
 
 
 def draw(found: dict[str, dict[str, dict[str, float]]], path: Path) -> None:
@@ -126,13 +128,14 @@ def main() -> int:
     """Entry point."""
     makers = {"arms": arms, "bodies": bodies, "elements": elements}
     found: dict[str, dict[str, dict[str, float]]] = {}
-    for name, counts in SERIES.items():
-        found[name] = {}
-        for count in counts:
-            tick, reference = tick_us(makers[name], count)
-            found[name][str(count)] = {"tick_us": tick, "ratio": tick / reference}
-            sys.stdout.write(f"{count} {name}: {tick:.0f} us a tick, {tick / reference:.2f} of the reference\n")
-            sys.stdout.flush()
+    with Reference() as reference:
+        for name, counts in SERIES.items():
+            found[name] = {}
+            for count in counts:
+                tick, part = tick_us(makers[name], count, reference)
+                found[name][str(count)] = {"tick_us": tick, "ratio": part}
+                sys.stdout.write(f"{count} {name}: {tick:.0f} us a tick, {part:.2f} of the reference\n")
+                sys.stdout.flush()
     ledger.note("growth", found)
     draw(found, ROOT / "docs" / "pictures" / "bench_growth.png")
     return 0

@@ -15,16 +15,16 @@ from pathlib import Path
 from typing import Any
 
 import ligature
-from ligature.cli.bench import measure
+from ligature.cli.bench import Run
 from ligature.model.scene import Scene
 from ligature.simulation import PHASES
 
 from tests.bench import ledger
-from tests.bench.reference import chain_step_us
+from tests.bench.reference import Reference, ratio
 
 ROOT = Path(__file__).resolve().parents[2]
-ROUNDS = 3
-SECONDS = 2.0
+SPANS, SECONDS = 60, 0.05
+"""Spans of each run, and seconds of each: the reference is timed after each of them."""
 
 
 def scenes() -> list[tuple[str, Scene]]:
@@ -70,30 +70,29 @@ def draw(series: dict[str, dict[str, Any]], path: Path) -> None:
     pyplot.close(figure)
 
 
+def measured(name: str, scene: Scene, rate: float, reference: Reference) -> dict[str, Any]:
+    """Figures of one scene with so many updates a second, which are printed, too."""
+    run = Run(scene, rate)
+    spans = [(1e6 * statistics.fmean(run.go_on(SECONDS)), reference.time().wall) for _ in range(SPANS)]
+    figures, step = run.figures(), statistics.median(step for _, step in spans)
+    phases = ", ".join(f"{k} {v:.0f}" for k, v in figures["phases_us"].items())
+    sys.stdout.write(
+        f"{name}: {figures['ticks_per_second']:.0f} ticks/s, real-time factor {figures['real_time_factor']:.2f}, p99 "
+        f"{figures['tick_p99_us']:.0f} us, {ratio(spans):.2f} of the reference of {step:.0f} us; us: {phases}\n"
+    )
+    sys.stdout.flush()
+    kept = {key: figures[key] for key in ("real_time_factor", "tick_p99_us", "phases_us", "memory_mb")}
+    return {**kept, "reference_us": step, "ratio": ratio(spans)}
+
+
 def main() -> int:
     """Entry point."""
     found = {}
-    for name, scene in scenes():
-        for rate in (200.0, 1000.0):
-            references, runs = [], []
-            for _ in range(ROUNDS):
-                references.append(chain_step_us())
-                runs.append(measure(scene, SECONDS, rate))
-            reference = statistics.median(references)
-            ratios = sorted(1e6 / r["ticks_per_second"] / step for r, step in zip(runs, references, strict=True))
-            figures = sorted(runs, key=lambda r: r["ticks_per_second"])[ROUNDS // 2]
-            ratio = ratios[ROUNDS // 2]
-            found[f"{name}, {rate:.0f} updates/s"] = {
-                **{key: figures[key] for key in ("real_time_factor", "tick_p99_us", "phases_us", "memory_mb")},
-                "reference_us": reference, "ratio": ratio,
-            }  # fmt: skip
-            phases = ", ".join(f"{k} {v:.0f}" for k, v in figures["phases_us"].items())
-            sys.stdout.write(
-                f"{name}, {rate:.0f} updates/s: {figures['ticks_per_second']:.0f} ticks/s, real-time factor "
-                f"{figures['real_time_factor']:.2f}, p99 {figures['tick_p99_us']:.0f} us, {ratio:.2f} of the "
-                f"reference of {reference:.0f} us; us: {phases}\n"
-            )
-            sys.stdout.flush()
+    with Reference() as reference:
+        for name, scene in scenes():
+            for rate in (200.0, 1000.0):
+                which = f"{name}, {rate:.0f} updates/s"
+                found[which] = measured(which, scene, rate, reference)
     ledger.note("scenes", found)
     release = json.loads(ledger.RELEASE.read_text()).get("scenes", {}) if ledger.RELEASE.exists() else {}
     draw({"release": release, "now": found}, ROOT / "docs" / "pictures" / "bench_phases.png")

@@ -19,10 +19,10 @@ from ligature.cli.master import command, master_answers
 
 from tests.bench import ledger
 from tests.bench.on_ros import CORPUS, processor_seconds
-from tests.bench.reference import chain_step_us
+from tests.bench.reference import STEPS, Reference
 from tests.waiting import until
 
-ROUNDS = 3
+ROUNDS = 5
 OURS = ledger.ROOT / "scenes" / "suturing" / "launch.yaml"
 PHYSICS = "ligature.cli.physics"
 SETTLED = 1.0
@@ -75,6 +75,25 @@ def first_state(arguments: list[str]) -> tuple[float, float, tuple[float, float]
         listener.unregister()
 
 
+def measured(name: str, arguments: list[str], reference: Reference) -> dict[str, float]:
+    """Figures of one command, which are printed, too."""
+    runs, ratios = [], []
+    for _ in range(ROUNDS):
+        runs.append(first_state(arguments))
+        ratios.append(1e6 * runs[-1][1] / reference.time(STEPS).processor)
+    walls, processor, sizes = zip(*runs, strict=True)
+    now, most = sizes[-1]
+    sys.stdout.write(
+        f"{name}: first state {min(walls):.2f} s after the command, median {statistics.median(walls):.2f} s, processor "
+        f"time {min(processor):.2f} s; physics has {now:.0f} MB, at most {most:.0f} MB\n"
+    )
+    sys.stdout.flush()
+    return {
+        "wall_s": statistics.median(walls), "least_wall_s": min(walls), "processor_s": min(processor),
+        "ratio": statistics.median(ratios), "memory_mb": now, "most_memory_mb": most,
+    }  # fmt: skip
+
+
 def main() -> int:
     """Entry point."""
     uri = f"http://127.0.0.1:{11900 + os.getpid() % 200}"
@@ -86,25 +105,15 @@ def main() -> int:
 
         rospy.init_node("start", anonymous=True, disable_signals=True)
         wall, spent = import_seconds()
-        reference = chain_step_us()
         found = {"import": {"wall_s": wall, "processor_s": spent}}
         sys.stdout.write(f"import ligature: {wall:.2f} s, {spent:.2f} s of a processor\n")
         scenes = {"suturing": [str(OURS)]}
         if CORPUS.exists():
             scenes["lab"] = [str(CORPUS), "-l", "10,11,6,7,8,9"]
-        for name, arguments in scenes.items():
-            first_state(arguments)  # compiles and fills caches
-            walls, processor, sizes = zip(*(first_state(arguments) for _ in range(ROUNDS)), strict=True)
-            now, most = sizes[-1]
-            found[name] = {
-                "wall_s": statistics.median(walls), "least_wall_s": min(walls), "processor_s": min(processor),
-                "ratio": 1e6 * min(processor) / reference, "memory_mb": now, "most_memory_mb": most,
-            }  # fmt: skip
-            sys.stdout.write(
-                f"{name}: first state {min(walls):.2f} s after the command, median {statistics.median(walls):.2f} s, "
-                f"processor time {min(processor):.2f} s; physics has {now:.0f} MB, at most {most:.0f} MB\n"
-            )
-            sys.stdout.flush()
+        with Reference() as reference:
+            for name, arguments in scenes.items():
+                first_state(arguments)  # compiles and fills caches
+                found[name] = measured(name, arguments, reference)
     finally:
         master.terminate()
         master.wait()

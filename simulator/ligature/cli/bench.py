@@ -68,34 +68,62 @@ def measure(scene: Scene, seconds: float, rate: float, loading: float = 0.0) -> 
 
     ``loading`` are the seconds that the scene took to load; they are part of the start.
     """
-    begin = time.perf_counter()
-    simulation = ligature.Simulation(scene, update=1.0 / rate)
-    batch = simulation.ticks_per_update
-    simulation.step(batch)
-    start = loading + time.perf_counter() - begin
-    for _ in range(max(1, WARM_UP // batch)):
-        simulation.step(batch)
-    for phase in simulation.phases.values():
-        phase.seconds = 0.0
-    times: list[float] = []
-    end = time.perf_counter() + seconds
-    while time.perf_counter() < end:
-        before = time.perf_counter()
-        simulation.step(batch)
-        times.append((time.perf_counter() - before) / batch)
-    total = float(np.sum(times)) * batch
-    ticks = len(times) * batch
-    p50, p99 = np.percentile(times, [50, 99])
-    return {
-        "dt_ms": simulation.dt * 1e3,
-        "update_ms": simulation.dt * batch * 1e3,
-        "ticks_per_second": ticks / total,
-        "real_time_factor": ticks * simulation.dt / total,
-        "tick_p50_us": p50 * 1e6,
-        "tick_p99_us": p99 * 1e6,
-        "tick_max_us": max(times) * 1e6,
-        "start_s": start,
-        "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-        "problems": [str(problem) for problem in simulation.problems],
-        "phases_us": {name: phase.seconds / ticks * 1e6 for name, phase in simulation.phases.items()},
-    }
+    run = Run(scene, rate)
+    run.go_on(seconds)
+    figures = run.figures()
+    figures["start_s"] += loading
+    return figures
+
+
+class Run:
+    """An unthrottled run of a scene in this process, in as many spans as its caller wants.
+
+    Parameters
+    ----------
+    scene
+        What is simulated.
+    rate
+        Updates a second of simulated time.
+    """
+
+    def __init__(self, scene: Scene, rate: float) -> None:
+        begin = time.perf_counter()
+        self._simulation = ligature.Simulation(scene, update=1.0 / rate)
+        self._batch = self._simulation.ticks_per_update
+        self._simulation.step(self._batch)
+        self._start = time.perf_counter() - begin
+        for _ in range(max(1, WARM_UP // self._batch)):
+            self._simulation.step(self._batch)
+        for phase in self._simulation.phases.values():
+            phase.seconds = 0.0
+        self._times: list[float] = []
+
+    def go_on(self, seconds: float) -> list[float]:
+        """Go on for ``seconds`` on the clock; returns the seconds of a tick in each update."""
+        times = []
+        end = time.perf_counter() + seconds
+        while time.perf_counter() < end:
+            before = time.perf_counter()
+            self._simulation.step(self._batch)
+            times.append((time.perf_counter() - before) / self._batch)
+        self._times += times
+        return times
+
+    def figures(self) -> dict[str, Any]:
+        """Figures of all spans together."""
+        simulation, batch = self._simulation, self._batch
+        total, ticks = float(np.sum(self._times)) * batch, len(self._times) * batch
+        p50, p99 = np.percentile(self._times, [50, 99])
+        return {
+            "dt_ms": simulation.dt * 1e3,
+            "update_ms": simulation.dt * batch * 1e3,
+            "ticks_per_second": ticks / total,
+            "real_time_factor": ticks * simulation.dt / total,
+            "tick_p50_us": p50 * 1e6,
+            "tick_p99_us": p99 * 1e6,
+            "tick_max_us": max(self._times) * 1e6,
+            "start_s": self._start,
+            "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+            "problems": [str(problem) for problem in simulation.problems],
+            "phases_us": {name: phase.seconds / ticks * 1e6 for name, phase in simulation.phases.items()},
+        }
