@@ -277,6 +277,16 @@ class Picture:
         here = self.place(tip(self._served, "PSM1"))
         self._person.holds_at(*here, [tuple(0.25 * (goal - here)), tuple(0.75 * (goal - here))])
 
+    def found(self) -> str:
+        """What a reader of a failure wants to know: where the tip is, what lies there in the window, what the arm does."""
+        here, arm = self.place(tip(self._served, "PSM1")), self._served.arm("PSM1")
+        lies = self._person.driver.execute_script(
+            "const e = document.elementFromPoint(arguments[0], arguments[1]);"
+            "return e ? `${e.tagName} ${e.id} ${e.textContent.slice(0, 80)}` : 'nothing'", *map(float, here),
+        )  # fmt: skip
+        doing = {name: arm[name].tolist() for name in ("operating", "homed", "busy")}
+        return f"at {here} over {lies}; PSM1 {doing}; {self._served.lines[-3:]}"
+
     def there(self, goal: np.ndarray) -> bool:
         """Whether the tip is seen at ``goal``."""
         return bool(np.abs(self.place(tip(self._served, "PSM1")) - goal).max() < 4.0)
@@ -291,7 +301,7 @@ def test_a_drag_in_the_picture_takes_the_tip_along(served: Served, in_view: Pers
         # the arm follows while the pointer is held, however slow the machine is
         held(
             lambda: picture.drags_to(goal), operator.lets_go, lambda: picture.there(goal),
-            lambda: f"the tip is at {goal}, not at {picture.place(tip(served, 'PSM1'))}: {served.lines[-3:]}",
+            lambda: f"the tip is at {goal}, not {picture.found()}",
         )  # fmt: skip
         end = standing(served)
         assert picture.there(goal), "and stays there"
@@ -320,7 +330,7 @@ def test_a_picture_of_other_eyes_does_not_move_what_is_dragged(served: Served, i
                 presses(operator, "lig-eyes")
             return True
 
-        held(lambda: picture.drags_to(goal), operator.lets_go, turns_one_eye_off, "the tip is dragged")
+        held(lambda: picture.drags_to(goal), operator.lets_go, turns_one_eye_off, picture.found)
     finally:
         presses(operator, "lig-eyes")
         presses(operator, "lig-swap")
