@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import cross, matrix_of, multiply, rotate, rotate_back, rotation_vector
 from ligature.suture.chain import invert_spd6
-from ligature.suture.rotations import cross, matrix_of, multiply, rotate, rotate_back, rotation_vector
 from ligature.tables import opener
 
 Array = NDArray[np.float64]

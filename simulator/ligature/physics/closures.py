@@ -21,7 +21,7 @@ from ligature.model.mechanism import Chain, chain_of
 from ligature.model.scene import Closure
 from ligature.physics.articulation import is_point, needs_link
 from ligature.physics.engine import CLOSING, Engine
-from ligature.physics.linkage import End, lay_out, moving_with
+from ligature.physics.linkage import End, lay_out, moving_trees
 from ligature.physics.projection import MOVED, close_loops, measure_loops
 from ligature.tables import table_of
 
@@ -70,7 +70,7 @@ class Closures:
         self._ends: list[End] = []
         engine.motions.forget_all()
         for closure in engine.scene.closures:
-            mechanism = moving_with(engine, self._trees_of(closure))
+            mechanism = moving_trees(engine, self._trees_of(closure))
             if not mechanism:
                 continue  # nothing of it can be moved, by a projection as little as by a constraint
             if needs_link(engine.scene, closure):

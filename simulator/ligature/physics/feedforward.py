@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from ligature.kernels import inlined
 from ligature.physics.trees import SLIDES, Array, Trees, bear, turned
+from ligature.rotations import cross
 
 
 @inlined
@@ -29,7 +30,7 @@ def find_efforts(trees: Trees, k: int, dt: float) -> None:
         if axis >= 0:
             rate, now = trees.change[axis] / dt, trees.joints[1, axis]
             ux, uy, uz = turned(frame[r], trees.fixed[r, 0], trees.fixed[r, 1], trees.fixed[r, 2])
-            wx, wy, wz = _cross(speed[p, 3], speed[p, 4], speed[p, 5], now * ux, now * uy, now * uz)
+            wx, wy, wz = cross(speed[p, 3], speed[p, 4], speed[p, 5], now * ux, now * uy, now * uz)
             if rows[r, 1] == SLIDES:
                 lx, ly, lz = lx + rate * ux + 2.0 * wx, ly + rate * uy + 2.0 * wy, lz + rate * uz + 2.0 * wz
             else:
@@ -46,7 +47,7 @@ def _accelerate(trees: Trees, r: int) -> None:
     lx, ly, lz = _at(own, speed, trees.frame[r], pose)
     fx, fy, fz = m * lx, m * ly, m * lz
     load[0], load[1], load[2] = fx, fy, fz
-    mx, my, mz = _cross(pose[0], pose[1], pose[2], fx, fy, fz)
+    mx, my, mz = cross(pose[0], pose[1], pose[2], fx, fy, fz)
     hx, hy, hz = 0.0, 0.0, 0.0
     for a in range(3):
         ux, uy, uz = turned(pose, 1.0 if a == 0 else 0.0, 1.0 if a == 1 else 0.0, 1.0 if a == 2 else 0.0)
@@ -54,7 +55,7 @@ def _accelerate(trees: Trees, r: int) -> None:
         spin = trees.inertia[r, a] * (ux * speed[3] + uy * speed[4] + uz * speed[5])
         mx, my, mz = mx + change * ux, my + change * uy, mz + change * uz
         hx, hy, hz = hx + spin * ux, hy + spin * uy, hz + spin * uz
-    gx, gy, gz = _cross(speed[3], speed[4], speed[5], hx, hy, hz)
+    gx, gy, gz = cross(speed[3], speed[4], speed[5], hx, hy, hz)
     load[3], load[4], load[5] = mx + gx, my + gy, mz + gz
 
 
@@ -62,12 +63,7 @@ def _accelerate(trees: Trees, r: int) -> None:
 def _at(acceleration: Array, speed: Array, origin: Array, point: Array) -> tuple[float, float, float]:
     """Linear acceleration at a ``point`` of a body that has ``acceleration`` and ``speed`` (6,) at ``origin``."""
     x, y, z = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
-    ax, ay, az = _cross(acceleration[3], acceleration[4], acceleration[5], x, y, z)
-    ux, uy, uz = _cross(speed[3], speed[4], speed[5], x, y, z)
-    ux, uy, uz = _cross(speed[3], speed[4], speed[5], ux, uy, uz)
+    ax, ay, az = cross(acceleration[3], acceleration[4], acceleration[5], x, y, z)
+    ux, uy, uz = cross(speed[3], speed[4], speed[5], x, y, z)
+    ux, uy, uz = cross(speed[3], speed[4], speed[5], ux, uy, uz)
     return acceleration[0] + ax + ux, acceleration[1] + ay + uy, acceleration[2] + az + uz
-
-
-@inlined
-def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

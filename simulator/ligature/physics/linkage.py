@@ -32,7 +32,7 @@ class End:
     point: bool
 
 
-def moving_with(engine: Engine, trees: Sequence[int]) -> tuple[int, ...]:
+def moving_trees(engine: Engine, trees: Sequence[int]) -> tuple[int, ...]:
     """The trees that move and that loops join to ``trees``, sorted."""
     moves = [not tree.static or bool(tree.axes) for tree in engine.trees]
     return tuple(sorted(k for k in joined(engine, [k for k in trees if moves[k]]) if moves[k]))

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ligature.kernels import inlined, kernel
 from ligature.model.frames import inverse
 from ligature.model.scene import Scene
+from ligature.rotations import matrix_of, rotate, rotate_back
 from ligature.soft.frame import Frame, FrameArrays, into, open_frame, velocity_at
 from ligature.soft.needle import ScenePiercer
 from ligature.suture.bodies import SutureBodies
 from ligature.suture.colliders import shape_arrays
-from ligature.suture.rotations import matrix_of, rotate, rotate_back
 from ligature.tables import opener, table_of
 from ligature.tissue import contact_arrays as arrays
 from ligature.tissue.block import TissueBlock

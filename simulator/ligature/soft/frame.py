@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ligature.kernels import inlined, kernel
 from ligature.model.frames import inverse
 from ligature.model.scene import Body
-from ligature.suture.rotations import cross, matrix_of, rotate_back
+from ligature.rotations import cross, matrix_of, rotate_back
 from ligature.tables import opener, table_of
 
 Array = NDArray[np.float64]

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import rotate_back
 from ligature.soft.frame import Frame, FrameArrays, into, open_frame, turn_six, velocity_at
 from ligature.soft.thread import SceneThread
 from ligature.suture.layout import Nodes
 from ligature.suture.rod import Rod
-from ligature.suture.rotations import rotate_back
 from ligature.suture.springs import Springs, open_springs
 from ligature.suture.tracking import open_nodes
 from ligature.tables import opener, table_of

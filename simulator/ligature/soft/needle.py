@@ -12,10 +12,10 @@ from ligature.kernels import inlined, kernel
 from ligature.model.piercing import Needle
 from ligature.model.scene import Body, Scene
 from ligature.model.shapes import Box, Capsule, Cone, Cylinder, Sphere
+from ligature.rotations import matrix_of, multiply, rotate, rotate_back, rotation_vector
 from ligature.soft.frame import Frame, FrameArrays, into, open_frame, turn_six, velocity_at
 from ligature.suture.bodies import HeldBodies
 from ligature.suture.rod import Rod
-from ligature.suture.rotations import matrix_of, multiply, rotate, rotate_back, rotation_vector
 from ligature.suture.springs import open_springs
 from ligature.suture.tracking import open_nodes
 from ligature.tables import opener, table_of

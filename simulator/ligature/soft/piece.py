@@ -13,6 +13,7 @@ from ligature.model.frames import inverse
 from ligature.model.scene import Scene
 from ligature.model.soft import TissueBody
 from ligature.model.state import MAX_INSERTIONS, MAX_PUNCTURES, StateRecord
+from ligature.rotations import cross, rotate
 from ligature.soft.contacts import BodyContacts
 from ligature.soft.floating import Floating
 from ligature.soft.frame import Frame, open_frame
@@ -21,7 +22,6 @@ from ligature.soft.needle import ScenePiercer
 from ligature.soft.thread import SceneThread
 from ligature.suture.bodies import SutureBodies
 from ligature.suture.rod import Rod
-from ligature.suture.rotations import cross, rotate
 from ligature.tissue.block import TissueBlock
 from ligature.tissue.layout import open_tissue
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import matrix_of, rotate, rotate_back
 from ligature.soft.frame import Frame, FrameArrays, into, open_frame, turn_six, velocity_at
 from ligature.soft.needle import ScenePiercer
 from ligature.suture.layout import Nodes
 from ligature.suture.rod import Rod
-from ligature.suture.rotations import matrix_of, rotate, rotate_back
 from ligature.suture.springs import CAPACITY, Springs, open_springs
 from ligature.suture.tracking import open_nodes
 from ligature.tables import opener, table_of

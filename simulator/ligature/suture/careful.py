@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import cross, rotate
 from ligature.suture.coupled_solve import solve_coupled
 from ligature.suture.coupling import add_closed, conclude_contacts, open_contacts, rigid
 from ligature.suture.layout import Joints, Nodes, Touches, Work
 from ligature.suture.passage_forces import add_passage_forces, settle_passages
 from ligature.suture.passages import Passages
-from ligature.suture.rotations import cross, rotate
 from ligature.suture.springs import Springs, add_springs, settle_springs
 from ligature.suture.step import LARGE_SWING, assemble, correct, finish, linearise, predict
 from ligature.tables import copy_into

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
+from ligature.rotations import cross, matrix_of, rotate, rotate_back
 from ligature.suture.layout import FrictionMode, Nodes, Shapes, Touches, Work
-from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

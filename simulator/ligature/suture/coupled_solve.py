@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import cross, rotate
 from ligature.suture.chain import factor, invert_spd6, solve, solve_within
 from ligature.suture.coupling import push
 from ligature.suture.layout import Nodes, Touches, Work
-from ligature.suture.rotations import cross, rotate
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import cross, multiply, rotate, rotation_vector
 from ligature.suture.layout import FrictionMode, Nodes, Touches, Work
-from ligature.suture.rotations import cross, multiply, rotate, rotation_vector
 
 Array = NDArray[np.float64]
 

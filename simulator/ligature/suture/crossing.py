@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import cross, multiply, rotation_vector, turn
 from ligature.suture.contacts import GROUP, nearest, overlap
 from ligature.suture.layout import Nodes, Touches, Work
-from ligature.suture.rotations import cross, multiply, rotation_vector, turn
 
 Array = NDArray[np.float64]
 

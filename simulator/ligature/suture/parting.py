@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
 from ligature.mesh.distance import signed_distance
+from ligature.rotations import cross, matrix_of, rotate, rotate_back
 from ligature.suture.contacts import RECOVERY
 from ligature.suture.layout import RodArrays
-from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 from ligature.suture.springs import open_springs
 from ligature.suture.substeps import open_rod
 

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import cross, matrix_of, multiply, quaternion_of, rotation_vector
 from ligature.suture.chain import invert_spd6
 from ligature.suture.layout import FrictionMode, Nodes, Work
 from ligature.suture.passages import Passages
-from ligature.suture.rotations import cross, matrix_of, multiply, quaternion_of, rotation_vector
 from ligature.suture.tracking import open_passages
 
 Array = NDArray[np.float64]

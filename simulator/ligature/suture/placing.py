@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
-from ligature.suture.rotations import matrix_of, multiply, rotate
+from ligature.rotations import matrix_of, multiply, rotate
 from ligature.tables import opener
 
 Array = NDArray[np.float64]

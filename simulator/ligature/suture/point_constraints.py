@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined
+from ligature.rotations import matrix_of, rotate, rotate_back
 from ligature.suture.layout import FrictionMode, Nodes, Touches, Work
-from ligature.suture.rotations import matrix_of, rotate, rotate_back
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

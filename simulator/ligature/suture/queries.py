@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from ligature.kernels import compiled, inlined
 from ligature.model.hits import Contact, RayHits
 from ligature.model.poses import compose
+from ligature.rotations import matrix_of, rotate
 from ligature.suture.bodies import Bodies
 from ligature.suture.contacts import deepest, nearest
 from ligature.suture.rod import Rod
 from ligature.suture.rods import Rods
-from ligature.suture.rotations import matrix_of, rotate
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined
+from ligature.rotations import cross
 from ligature.suture.coupling import lever_of
 from ligature.suture.layout import Joints, Touches, Work
-from ligature.suture.rotations import cross
 
 Array = NDArray[np.float64]
 

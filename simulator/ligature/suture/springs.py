@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import multiply, rotation_vector
 from ligature.suture.layout import Nodes, Work
-from ligature.suture.rotations import multiply, rotation_vector
 from ligature.tables import opener
 
 Array = NDArray[np.float64]

@@ -11,12 +11,7 @@ from __future__ import annotations
 import math
 
 from ligature.kernels import inlined, kernel
-from ligature.suture.coupled_solve import solve_coupled
-from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
-from ligature.suture.layout import Joints, Nodes, Touches, Work
-from ligature.suture.passage_forces import add_passage_forces, settle_passages
-from ligature.suture.passages import Passages
-from ligature.suture.rotations import (
+from ligature.rotations import (
     cross,
     left_jacobian_inverse_times,
     matrix_of,
@@ -25,6 +20,11 @@ from ligature.suture.rotations import (
     rotation_vector,
     turn,
 )
+from ligature.suture.coupled_solve import solve_coupled
+from ligature.suture.coupling import add_contacts, conclude_contacts, settle_contacts
+from ligature.suture.layout import Joints, Nodes, Touches, Work
+from ligature.suture.passage_forces import add_passage_forces, settle_passages
+from ligature.suture.passages import Passages
 from ligature.suture.springs import Springs, add_springs, settle_springs
 
 MAX_NEWTON = 8

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import cross, turn
 from ligature.suture import layout
 from ligature.suture.careful import advance_carefully
 from ligature.suture.contacts import detect
@@ -21,7 +22,6 @@ from ligature.suture.placing import find_pushed, sound
 from ligature.suture.plasticity import set_bends
 from ligature.suture.point_constraints import add_point_constraints
 from ligature.suture.reactions import add_reactions, find_tension
-from ligature.suture.rotations import cross, turn
 from ligature.suture.springs import Springs, add_spring_impulses, begin_springs, open_springs
 from ligature.suture.step import advance, finish, linearise
 from ligature.suture.tracking import open_passages

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.kernels import inlined, kernel
+from ligature.rotations import cross, matrix_of, rotate, rotate_back
 from ligature.suture import layout
 from ligature.suture import passages as arrays
 from ligature.suture.layout import FrictionMode
-from ligature.suture.rotations import cross, matrix_of, rotate, rotate_back
 from ligature.tables import opener
 
 Array = NDArray[np.float64]
