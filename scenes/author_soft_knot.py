@@ -48,9 +48,9 @@ RESTED, REST = 0.05, (0.02, 0.004)
 """How far along the long end its rest is, and its width and thickness."""
 
 
-def way() -> list[tuple[float, float]]:
+def way(width: float) -> list[tuple[float, float]]:
     """The thread's way at first, from its short end on: across the wound, and out of the tissue."""
-    half = 0.5 * WOUND[0] + BITE
+    half = 0.5 * width + BITE
     inside = np.linspace(0.0, np.pi, 41)
     points = [(half, SHORT)]
     points += [(half * np.cos(a), -DEEP * np.sin(a) ** 0.8) for a in inside.tolist()]
@@ -60,7 +60,7 @@ def way() -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in [*points, end]]
 
 
-def pad() -> dict[str, Any]:
+def pad(width: float, youngs: float | None) -> dict[str, Any]:
     """The tissue, whose back is held."""
     x, y, z = PLACE
     place = pose_matrix((x, y - PAD[2] / 2, z + LEVEL), (-np.pi / 2, 0, 0))
@@ -69,9 +69,10 @@ def pad() -> dict[str, Any]:
     body = small.body("Pad", place, 0.0, shapes, **keys)
     body["ligature tissue"] = {
         "material": "silicone pad",
+        **({} if youngs is None else {"youngs modulus": youngs}),
         "cell size": CELL,
         "fixed": ["-z"],
-        "slits": [small.slit(WOUND, PAD[2] / 2)],
+        "slits": [small.slit((width, *WOUND[1:]), PAD[2] / 2)],
     }
     return body
 
@@ -83,19 +84,19 @@ def plate() -> dict[str, Any]:
     return ligating.body("Plate", shapes, 0.6, 0.6, 0.6)
 
 
-def rest() -> dict[str, Any]:
+def rest(width: float) -> dict[str, Any]:
     """What the long end lies on."""
-    points = np.array(way())
+    points = np.array(way(width))
     at = points[-2] + RESTED * (points[-1] - points[-2]) / np.linalg.norm(points[-1] - points[-2])
     top = LEVEL - 0.5 * ligating.DIAMETER
     shapes = [small.shape("BOX", (at[0], at[1], top / 2), (0, 0, ASIDE), x=REST[0], y=REST[1], z=top)]
     return ligating.body("Rest", shapes, 0.6, 0.6, 0.6)
 
 
-def thread() -> dict[str, Any]:
+def thread(width: float) -> dict[str, Any]:
     """The thread, from its short end on."""
     x, y, z = PLACE
-    points = np.array(way())
+    points = np.array(way(width))
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     elements = int(length / ligating.ELEMENT)
     return {
@@ -111,23 +112,24 @@ def thread() -> dict[str, Any]:
     }
 
 
-def task() -> dict[str, Any]:
+def task(width: float, youngs: float | None) -> dict[str, Any]:
     """Tissue, its plate, clip, rest, thread and endoscope."""
     found = theatre.document({"BODY CameraFrame": theatre.camera_frame()})
     own = {
-        "BODY Pad": pad(),
+        "BODY Pad": pad(width, youngs),
         "BODY Plate": plate(),
-        "BODY Rest": rest(),
-        "BODY Clip": ligating.clip(0.5 * WOUND[0] + BITE),
+        "BODY Rest": rest(width),
+        "BODY Clip": ligating.clip(0.5 * width + BITE),
     }
     return {
-        **found, **own, "SUTURE Thread": thread(), "bodies": [*own, "BODY CameraFrame"], "sutures": ["SUTURE Thread"],
+        **found, **own, "SUTURE Thread": thread(width),
+        "bodies": [*own, "BODY CameraFrame"], "sutures": ["SUTURE Thread"],
     }  # fmt: skip
 
 
-def texts() -> dict[str, str]:
-    """Text of every file of the scene by its path."""
-    documents = {"task.yaml": task(), "launch.yaml": theatre.launch("task.yaml")}
+def texts(width: float = WOUND[0], youngs: float | None = None) -> dict[str, str]:
+    """Text of every file of the scene by its path, with a wound of that width and tissue of that Young's modulus."""
+    documents = {"task.yaml": task(width, youngs), "launch.yaml": theatre.launch("task.yaml")}
     return theatre.in_text(documents, {}, Path(__file__).name)
 
 

@@ -10,27 +10,24 @@ again; ``--again`` runs those that failed once more. Ends with the table of FILE
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import statistics
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import ligature
+
+from tests.bench.campaign import Row, keep, read
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
 import suture  # noqa: E402
 
-Row = dict[str, Any]
-"""What is kept of one seed: seconds, millimetres, newtons."""
-
 
 def attempt(seed: int, throws: int) -> Row:
-    """One suture in a world of its own, and what came of it."""
+    """One suture in a world of its own, and what came of it: seconds, millimetres, newtons."""
     simulation = ligature.Simulation(ligature.load(suture.SCENE))
     suture.scatter(simulation, seed)
     started = time.perf_counter()
@@ -50,13 +47,6 @@ def attempt(seed: int, throws: int) -> Row:
         "drops": measures.drops,
         "state": simulation.state_hash()[:16],
     }
-
-
-def read(file: Path) -> dict[tuple[int, int], Row]:
-    """The newest row of each number of throws and seed."""
-    lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
-    rows = map(json.loads, lines)
-    return {(row["throws"], row["seed"]): row for row in rows}
 
 
 def reported(row: Row) -> str:
@@ -113,17 +103,15 @@ def main() -> int:
     arguments.add_argument("--again", action="store_true", help="run seeds that failed once more")
     arguments.add_argument("--table", action="store_true", help="only print the table of what is there")
     given = arguments.parse_args()
-    given.into.parent.mkdir(parents=True, exist_ok=True)
     for seed in () if given.table else range(given.start, given.start + given.count):
-        before = read(given.into).get((given.throws, seed))
+        before = read(given.into, "throws", "seed").get((given.throws, seed))
         if before is not None and (before["success"] or not given.again):
             continue
         row = attempt(seed, given.throws)
-        with given.into.open("a", encoding="utf-8") as kept:
-            kept.write(json.dumps(row) + "\n")
+        keep(given.into, row)
         sys.stdout.write(reported(row) + "\n")
         sys.stdout.flush()
-    sys.stdout.write("\n".join(table(list(read(given.into).values()))) + "\n")
+    sys.stdout.write("\n".join(table(list(read(given.into, "throws", "seed").values()))) + "\n")
     return 0
 
 

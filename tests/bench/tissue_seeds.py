@@ -17,18 +17,16 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import ligature
 import numpy as np
+
+from tests.bench.campaign import Row, keep, read
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
 import suture_tissue  # noqa: E402
 from suture import scatter  # noqa: E402
-
-Row = dict[str, Any]
-"""What is kept of one seed: millimetres, kilopascals, newtons, seconds."""
 
 
 def drawn(seed: int) -> tuple[float, float]:
@@ -59,7 +57,7 @@ def scene_of(gap: float, youngs: float, folder: Path) -> ligature.Scene:
 
 
 def attempt(seed: int, stitches: int = 1) -> Row:
-    """One suture in a world of its own, and what came of it."""
+    """One suture in a world of its own, and what came of it: millimetres, kilopascals, newtons, seconds."""
     gap, youngs = drawn(seed)
     with tempfile.TemporaryDirectory() as folder:
         simulation = ligature.Simulation(scene_of(gap, youngs, Path(folder)))
@@ -76,12 +74,6 @@ def attempt(seed: int, stitches: int = 1) -> Row:
         "simulated": round(simulation.time, 2), "took": round(time.perf_counter() - started, 1),
         "load": round(os.getloadavg()[0], 1),
     }  # fmt: skip
-
-
-def read(file: Path) -> dict[int, Row]:
-    """The newest row of each seed."""
-    rows = map(json.loads, file.read_text(encoding="utf-8").splitlines() if file.exists() else ())
-    return {row["seed"]: row for row in rows}
 
 
 def table(rows: list[Row]) -> Iterator[str]:
@@ -109,16 +101,14 @@ def main() -> int:
     arguments.add_argument("--table", action="store_true", help="only print the table of what is there")
     given = arguments.parse_args()
     into = given.into or ROOT / "build" / f"tissue_seeds_{given.stitches}.jsonl"
-    into.parent.mkdir(parents=True, exist_ok=True)
     for seed in () if given.table else range(given.start, given.start + given.count):
-        if seed in read(into):
+        if (seed,) in read(into, "seed"):
             continue
         row = attempt(seed, given.stitches)
-        with into.open("a", encoding="utf-8") as kept:
-            kept.write(json.dumps(row) + "\n")
+        keep(into, row)
         sys.stdout.write(json.dumps(row) + "\n")
         sys.stdout.flush()
-    sys.stdout.write("\n".join(table(list(read(into).values()))) + "\n")
+    sys.stdout.write("\n".join(table(list(read(into, "seed").values()))) + "\n")
     return 0
 
 
