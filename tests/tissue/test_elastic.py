@@ -340,3 +340,27 @@ def test_two_processes_with_different_thread_counts_give_the_same_bits():
         prints.append(run.stdout)
     assert prints[0] == prints[1]
     assert len(prints[0].strip()) == 64
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, 10**6), st.floats(0.0, 0.49), st.floats(4.5, 5.5), st.floats(5.0, 40.0))
+def test_what_is_dragged_by_many_cells_comes_back(seed, poisson, edge, far):
+    """One to three nodes go anywhere at 0.1 m/s, by the forces that take them there, until they are let go."""
+    rng = np.random.default_rng(seed)
+    grid = _block((8 * 1e-3 * edge, 0.04, 0.015), (8, 8, 3))
+    elastic = ElasticGrid(grid, [TissueMaterial(YOUNGS, poisson)], grid.site[:, rng.integers(3)] == 0)
+    rest = elastic.x.copy()
+    free = elastic.free[np.argsort(np.linalg.norm(rest[elastic.free] - rest[rng.choice(elastic.free)], axis=1))]
+    nodes = rng.choice(free[:8], rng.integers(1, 4), replace=False)
+    moved = np.concatenate([elastic.response(np.array([node]), np.ones(1)) for node in nodes])
+    compliance = moved[:, nodes].reshape(len(moved), -1)
+    way = rng.normal(size=3)
+    way *= 1e-3 * far / np.linalg.norm(way)
+    for k in range(150):
+        d = elastic.predict()
+        left = rest[nodes] + way * min(1.0, (k + 1) * 0.4 / far) - (elastic.x + d)[nodes]
+        elastic.advance(d + np.tensordot(np.linalg.solve(compliance.T, left.reshape(-1)), moved, 1))
+        assert np.abs(elastic.x - rest).max() < 1.5e-3 * far + 5e-3
+    for _ in range(1500):
+        elastic.advance(elastic.predict())
+    assert np.abs(elastic.x - rest).max() < 1e-6

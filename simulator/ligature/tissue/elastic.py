@@ -8,6 +8,9 @@ with f the corotated elastic forces, K the stiffness at rest, β the material's 
 rotation, which keeps the fixed matrix stable while cells turn. At rest f = 0: neither Kₛ nor β change where tissue
 rests, only how it gets there. A⁻¹ is the compliance of the step: what a constant force in it moves. So a step is one
 solve, whose work is shared out over its ticks, and contacts add their forces times their `response`.
+
+A cell turned by θ is in some direction about 1 / 3 + sin²θ (λ + 2 μ) / μ times as stiff as the matrix is there, with
+Lamé's λ and μ. Nodes of such cells go a part of d: that changes where they rest as little as β does.
 """
 
 from __future__ import annotations
@@ -39,6 +42,9 @@ STEP = 4e-3
 ROTATION_RESISTANCE = 1.0
 """The ε above."""
 
+OVERSHOOT = 2.0
+"""Largest product of a turned cell's stiffness, over that of the matrix, and of the part of d that its nodes go."""
+
 TABLE_NODES = 1500
 """Free nodes up to which the whole compliance is tabulated."""
 
@@ -69,6 +75,8 @@ class Bulk(NamedTuple):
     R: Array  # scratch, and so on
     c: Array
     y: Array
+    part: Array  # (n,) of d
+    turned: Array  # (c,) how many times as stiff a cell is that has turned by a right angle
 
 
 def _bulk_example() -> Bulk:
@@ -77,7 +85,7 @@ def _bulk_example() -> Bulk:
     i = lambda *shape: np.zeros(shape, np.int64)  # noqa: E731
     return Bulk(
         i(1, 8), i(1, 3), z((1, 8, 3, 3)), z((1, 3)), z((1, 3)), z((1, 3)), z((1, 3)), z((1, 4)), z(1), z(3), i(1),
-        Elimination(i(1, 5), i(1), z(1), z(1), z(1)), z(1), z((1, 3)), z(3), i(1), z(1), z(1), z(1),
+        Elimination(i(1, 5), i(1), z(1), z(1), z(1)), z(1), z((1, 3)), z(3), i(1), z(1), z(1), z(1), z(1), z(1),
     )  # fmt: skip
 
 
@@ -151,7 +159,7 @@ class ElasticGrid:
             np.ascontiguousarray(grid.cells[order]), batches, np.array([elements.blocks(K) for K in self._K]),
             self._size, np.ascontiguousarray(grid.sizes[order]), self.x, self.v, self.frames, self.mass, self.gravity,
             self.free, self._factor.arrays, shares(self._factor.arrays), self.force, self.load, self.progress,
-            np.zeros(9 * LANES), np.zeros(24 * LANES), np.zeros(24 * LANES),
+            np.zeros(9 * LANES), np.zeros(24 * LANES), np.zeros(24 * LANES), np.zeros(n), self._turned,
         )  # fmt: skip
         self._bulk_table = table_of(self._bulk)
         self.reset()
@@ -165,6 +173,8 @@ class ElasticGrid:
         self._size = np.ascontiguousarray(sizes[first])
         made_of = [self.materials[i] for i in self.grid.layer[first]]
         pairs = list(zip(self._size, made_of, strict=True))
+        moduli = np.array([elements.lame(m.youngs, m.poisson) for m in made_of])
+        self._turned = moduli[:, 0] / moduli[:, 1] + 2.0
         self._K = np.array([elements.stiffness(s, m.youngs, m.poisson) for s, m in pairs])
         skew = np.array([elements.skew_stiffness(s, m.youngs, m.poisson) for s, m in pairs])
         lag = np.array([1.0 + m.damping / self.h for m in made_of])
@@ -221,9 +231,8 @@ class ElasticGrid:
         return self.displacement()
 
     def advance(self, d: Array) -> None:
-        """Move the nodes by a step's displacements (n, 3)."""
-        self.x += d
-        np.divide(d, self.h, out=self.v)
+        """Move the nodes by a step's displacements (n, 3), those of cells that have turned far by a part of them."""
+        advance(self._bulk_table, d, self.h)
 
     def elastic_forces(self) -> Array:
         """Elastic forces on all nodes, those of supports included, (n, 3) N; turns the cells' frames."""
@@ -324,6 +333,28 @@ def begin(table: Integers, h: float) -> None:
         for a in range(3):
             b.load[3 * k + a] = b.force[b.free[k], a]
     b.progress[0] = 0
+
+
+@kernel
+def advance(table: Integers, d: Array, h: float) -> None:
+    """Move the nodes by their parts of the displacements ``d`` (n, 3) of a step of ``h`` s."""
+    b = open_bulk(table)
+    b.part[:] = 1.0
+    for batch in range(b.batches.shape[0]):
+        first, lanes, kind = b.batches[batch]
+        for lane in range(lanes):
+            half = b.frames[batch, 3 * LANES + lane] ** 2  # cos²(θ / 2)
+            turned = 4.0 * half * (1.0 - half) if half > 0.5 else 1.0  # sin²θ, 1 beyond a right angle
+            stiffer = 1.0 / 3.0 + turned * b.turned[kind]
+            if stiffer > OVERSHOOT:
+                for k in range(8):
+                    i = b.cells[first + lane, k]
+                    b.part[i] = min(b.part[i], OVERSHOOT / stiffer)
+    for i in range(b.x.shape[0]):
+        for a in range(3):
+            way = b.part[i] * d[i, a]
+            b.x[i, a] += way
+            b.v[i, a] = way / h
 
 
 @kernel
