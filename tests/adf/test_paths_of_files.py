@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 from ligature.adf import Severity
+from ligature.cache import temporary_folder
 from ligature.cli.check import findings
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n"
@@ -127,12 +128,14 @@ def test_one_finding_says_what_is_wrong_with_a_path(key: str, path: str, scene: 
         (scene / "painted.mtl").write_text(f"newmtl a\nmap_Kd {reference}\n".replace("\\\\", "\\"))
     root = os.geteuid() == 0
     if root:
+        temporary_folder.cache_clear()  # root's own, if an earlier test of this process needed one
         os.seteuid(65534)
     try:
         found = [d for d in findings(scene / "scene.yaml", [], strict=False) if d.severity >= Severity.WARNING]
     finally:
         if root:
             os.seteuid(0)
+            temporary_folder.cache_clear()
     about = [d for d in found if d.mark is not None and d.mark.file.name == reader.file]
     assert len(about) == 1, found
     assert words in str(about[0])

@@ -9,7 +9,6 @@ again; ``--again`` runs those that failed once more. Ends with the table of FILE
 
 from __future__ import annotations
 
-import argparse
 import os
 import statistics
 import sys
@@ -19,7 +18,7 @@ from pathlib import Path
 
 import ligature
 
-from tests.bench.campaign import Row, keep, read
+from tests.bench.campaign import Row, arguments, go_on
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
@@ -95,24 +94,12 @@ def table(rows: list[Row]) -> Iterator[str]:
 
 def main() -> int:
     """Entry point."""
-    arguments = argparse.ArgumentParser(description="Sutures from many places of the needle.")
-    arguments.add_argument("count", type=int, nargs="?", default=100)
-    arguments.add_argument("start", type=int, nargs="?", default=0)
-    arguments.add_argument("--throws", type=int, default=2)
-    arguments.add_argument("--into", type=Path, default=ROOT / "build" / "demo_seeds.jsonl")
-    arguments.add_argument("--again", action="store_true", help="run seeds that failed once more")
-    arguments.add_argument("--table", action="store_true", help="only print the table of what is there")
-    given = arguments.parse_args()
-    for seed in () if given.table else range(given.start, given.start + given.count):
-        before = read(given.into, "throws", "seed").get((given.throws, seed))
-        if before is not None and (before["success"] or not given.again):
-            continue
-        row = attempt(seed, given.throws)
-        keep(given.into, row)
-        sys.stdout.write(reported(row) + "\n")
-        sys.stdout.flush()
-    sys.stdout.write("\n".join(table(list(read(given.into, "throws", "seed").values()))) + "\n")
-    return 0
+    options = arguments("Sutures from many places of the needle.")
+    options.add_argument("--throws", type=int, default=2)
+    options.add_argument("--again", action="store_true", help="run seeds that failed once more")
+    given = options.parse_args()
+    into, throws = ROOT / "build" / "demo_seeds.jsonl", given.throws
+    return go_on(given, into, lambda seed: attempt(seed, throws), table, reported, throws=throws)
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ def rate(name: str, processes: int, seconds: float) -> float:
 
 
 class Spans(NamedTuple):
-    """What one process does: medians over spans, in turn with which the reference is timed."""
+    """What one process does; ratios are medians over spans, in turn with which the reference is timed."""
 
     of_wall: float
     """Steps for each second of the wall."""
@@ -95,22 +95,21 @@ def main() -> int:
     found = {}
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
     load = os.getloadavg()[0]
-    for name in sorted(name for name in gymnasium.registry if name.startswith("ligature/")):
-        with Reference() as reference:
-            one = alone(name, seconds, reference)
-        two = rate(name, 2, seconds)
-        found[name] = {
-            "steps_per_second": one.of_wall, "real_time_factor": one.of_wall * CONTROL,
-            "real_time_factor_of_processor": one.of_processor * CONTROL, "two_processes": two * CONTROL,
-            "ratio": one.ratio, "ratio_of_processor": one.ratio_of_processor, "reset": {"ms": one.reset_ms, "ratio": one.reset_ratio},
-        }  # fmt: skip
-        sys.stdout.write(
-            f"{name}: {one.of_wall:.0f} steps/s in one process, {one.of_wall * CONTROL:.2f} times real time, "
-            f"{one.of_processor * CONTROL:.2f} by processor time; {two:.0f} in two, {two * CONTROL:.2f} times; "
-            f"reset {one.reset_ms:.1f} ms; a step is {one.ratio:.2f} references, {one.ratio_of_processor:.2f} by "
-            "processor time\n"
-        )
-        sys.stdout.flush()
+    with Reference() as reference:
+        for name in sorted(name for name in gymnasium.registry if name.startswith("ligature/")):
+            one, two = alone(name, seconds, reference), rate(name, 2, seconds)
+            found[name] = {
+                "steps_per_second": one.of_wall, "real_time_factor": one.of_wall * CONTROL,
+                "real_time_factor_of_processor": one.of_processor * CONTROL, "two_processes": two * CONTROL,
+                "ratio": one.ratio, "ratio_of_processor": one.ratio_of_processor, "reset": {"ms": one.reset_ms, "ratio": one.reset_ratio},
+            }  # fmt: skip
+            sys.stdout.write(
+                f"{name}: {one.of_wall:.0f} steps/s in one process, {one.of_wall * CONTROL:.2f} times real time, "
+                f"{one.of_processor * CONTROL:.2f} by processor time; {two:.0f} in two, {two * CONTROL:.2f} times; "
+                f"reset {one.reset_ms:.1f} ms; a step is {one.ratio:.2f} references, {one.ratio_of_processor:.2f} by "
+                "processor time\n"
+            )
+            sys.stdout.flush()
     ledger.note("environments", found)
     sys.stdout.write(f"load of the machine at the start: {load:.1f}\n")
     return 0

@@ -3,14 +3,13 @@
     python -m tests.bench.knot_seeds [N] [START] [--into FILE] [--table]
 
 Each seed from START on draws how wide the wound gapes (2 to 6 mm) and how stiff the tissue is (50 to 300 kPa), besides
-what ``examples/soft_knot.py`` draws of it: the hands, the thread's friction, and some per cent of the stiffness; seed 0 is the scene's own. A
-line of JSON a seed goes to FILE (default `build/knot_seeds.jsonl`); seeds that FILE has are passed over. Ends with the
-table of FILE in Markdown; ``--table`` does only that.
+what ``examples/soft_knot.py`` draws of it: the hands, the thread's friction, and some per cent of the stiffness; seed 0
+is the scene's own. A line of JSON a seed goes to FILE (default `build/knot_seeds.jsonl`); seeds that FILE has are passed
+over. Ends with the table of FILE in Markdown; ``--table`` does only that.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -19,7 +18,7 @@ from pathlib import Path
 
 import ligature
 
-from tests.bench.campaign import Row, keep, read
+from tests.bench.campaign import Row, arguments, go_on
 from tests.bench.tissue_seeds import drawn
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,7 +51,8 @@ def attempt(seed: int) -> Row:
     assert tissue is not None
     return {
         "seed": seed, "success": found.success, "why": found.stopped, "kind": found.kind,
-        "youngs": round(1e-3 * tissue.materials[0].youngs, 1), "friction": round(scene.bodies[scene.rods[0].bodies[0]].friction, 3),
+        "youngs": round(1e-3 * tissue.materials[0].youngs, 1),
+        "friction": round(scene.bodies[scene.rods[0].bodies[0]].friction, 3),
         "gaps": [round(1e3 * gap, 3) for gap in found.gaps], "simulated": round(found.time, 2),
         "took": round(time.perf_counter() - started, 1),
     }  # fmt: skip
@@ -77,21 +77,8 @@ def table(rows: list[Row]) -> Iterator[str]:
 
 def main() -> int:
     """Entry point."""
-    arguments = argparse.ArgumentParser(description="Square knots over many wounds.")
-    arguments.add_argument("count", type=int, nargs="?", default=100)
-    arguments.add_argument("start", type=int, nargs="?", default=0)
-    arguments.add_argument("--into", type=Path, default=ROOT / "build" / "knot_seeds.jsonl")
-    arguments.add_argument("--table", action="store_true", help="only print the table of what is there")
-    given = arguments.parse_args()
-    for seed in () if given.table else range(given.start, given.start + given.count):
-        if (seed,) in read(given.into, "seed"):
-            continue
-        row = attempt(seed)
-        keep(given.into, row)
-        sys.stdout.write(f"{row}\n")
-        sys.stdout.flush()
-    sys.stdout.write("\n".join(table(list(read(given.into, "seed").values()))) + "\n")
-    return 0
+    given = arguments("Square knots over many wounds.").parse_args()
+    return go_on(given, ROOT / "build" / "knot_seeds.jsonl", attempt, table)
 
 
 if __name__ == "__main__":

@@ -48,9 +48,8 @@ def main() -> int:
             calls = {"restore": lambda s=simulation, t=taken: s.restore(t), "reset": simulation.reset}
             medians = {what: median(act, lambda s=simulation: s.step(20), reference) for what, act in calls.items()}
             found[name] = {what: one._asdict() for what, one in medians.items()}
-            sys.stdout.write(
-                f"{name}: {', '.join(f'{what} {one.ms:.2f} ms, {one.ratio:.1f} steps of the reference' for what, one in medians.items())}\n"
-            )
+            parts = [f"{what} {one.ms:.2f} ms, {one.ratio:.1f} of the reference" for what, one in medians.items()]
+            sys.stdout.write(f"{name}: {'; '.join(parts)}\n")
             simulation.close()
     ledger.note("resets", found)
     return 0

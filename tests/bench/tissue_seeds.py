@@ -9,8 +9,6 @@ of one thread); seeds that FILE has are passed over. Ends with the table of FILE
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import sys
 import tempfile
@@ -21,7 +19,7 @@ from pathlib import Path
 import ligature
 import numpy as np
 
-from tests.bench.campaign import Row, keep, read
+from tests.bench.campaign import Row, arguments, go_on
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "examples"))
@@ -93,23 +91,11 @@ def table(rows: list[Row]) -> Iterator[str]:
 
 def main() -> int:
     """Entry point."""
-    arguments = argparse.ArgumentParser(description="Sutures soft tissue over many wounds.")
-    arguments.add_argument("count", type=int, nargs="?", default=100)
-    arguments.add_argument("start", type=int, nargs="?", default=0)
-    arguments.add_argument("--stitches", type=int, default=1)
-    arguments.add_argument("--into", type=Path)
-    arguments.add_argument("--table", action="store_true", help="only print the table of what is there")
-    given = arguments.parse_args()
-    into = given.into or ROOT / "build" / f"tissue_seeds_{given.stitches}.jsonl"
-    for seed in () if given.table else range(given.start, given.start + given.count):
-        if (seed,) in read(into, "seed"):
-            continue
-        row = attempt(seed, given.stitches)
-        keep(into, row)
-        sys.stdout.write(json.dumps(row) + "\n")
-        sys.stdout.flush()
-    sys.stdout.write("\n".join(table(list(read(into, "seed").values()))) + "\n")
-    return 0
+    options = arguments("Sutures soft tissue over many wounds.")
+    options.add_argument("--stitches", type=int, default=1)
+    given = options.parse_args()
+    into = ROOT / "build" / f"tissue_seeds_{given.stitches}.jsonl"
+    return go_on(given, into, lambda seed: attempt(seed, given.stitches), table)
 
 
 if __name__ == "__main__":

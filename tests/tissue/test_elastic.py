@@ -15,6 +15,7 @@ from ligature.model.material import TissueMaterial
 from ligature.tissue.elastic import ElasticGrid
 from ligature.tissue.elements import CORNERS, lame, stiffness
 from ligature.tissue.lips import Lips
+from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 YOUNGS = 1e5
@@ -364,3 +365,21 @@ def test_what_is_dragged_by_many_cells_comes_back(seed, poisson, edge, far):
     for _ in range(1500):
         elastic.advance(elastic.predict())
     assert np.abs(elastic.x - rest).max() < 1e-6
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.45, 0.49])
+def test_a_turned_cell_is_as_stiff_as_its_nodes_are_slowed_for(poisson):
+    """Largest eigenvalues of its stiffness over its part of the matrix, about 60 random axes."""
+    material = TissueMaterial(YOUNGS, poisson)
+    elastic = ElasticGrid(_block((0.005, 0.005, 0.005), (1, 1, 1)), [material], np.zeros(8, dtype=bool))
+    matrix = elastic._step_K[0] + np.diag(np.repeat(elastic.mass, 3)) / elastic.h**2
+    lame_1, shear = lame(YOUNGS, poisson)
+    axes = np.random.default_rng(0).normal(size=(60, 3))
+    for angle in np.radians([0, 10, 20, 30, 45, 60, 90, 120, 180]):
+        bound = 1.0 / 3.0 + np.sin(min(angle, np.pi / 2)) ** 2 * (lame_1 / shear + 2.0)
+        found = 0.0
+        for axis in axes:
+            turn = np.kron(np.eye(8), Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix())
+            found = max(found, eigh(turn @ elastic._K[0] @ turn.T, matrix, eigvals_only=True)[-1])
+        assert found < 1.1 * bound
+        assert found > 0.85 * bound or poisson < 0.45 or angle > 2.1, "nor are nearly incompressible ones slowed more"
