@@ -102,11 +102,17 @@ class Sewn(Ligating):
 
     def _prepare(self) -> None:
         scene = self._simulation.scene
+        places = np.array([body.T_world_body[:3, 3] for body in scene.bodies])
+        self._find(list(scene.rods[0].bodies), places)
+
+    def _find(self, elements: list[int], places: Array) -> None:
+        """Find the wound and the thread, whose ``elements`` go from its short end on, with all bodies at ``places``."""
+        scene = self._simulation.scene
         self.wound, rod = Wound.of(scene), scene.rods[0]
-        self.elements, self.length = list(rod.bodies), float(rod.lengths.mean())
+        self.elements, self.length = elements, float(rod.lengths.mean())
         self.body, self.thickness, self.radius = self.elements[-1], 2.0 * rod.radius, ASIDE
         self._surface = float(self.wound.point(self._simulation.state[0], 1, 0.0, 0.0)[1])
-        points = np.array([scene.bodies[body].T_world_body[:3, 3] for body in self.elements])
+        points = places[elements]
         out = points[np.flatnonzero(points[:, 1] < self._surface)[0]]
         self.vessel = np.array([out[0] - ASIDE - 0.5 * self.thickness, self._surface - BEHIND, out[2]])
         self._round = 2.0 * np.pi * (self.radius + 0.5 * self.thickness)
@@ -219,22 +225,23 @@ class Knotting(Knotter):
         return SLOWEST * action, left
 
 
+def hands(simulation: ligature.Simulation) -> tuple[PsmArm, ...]:
+    """Both arms, the right hand first."""
+    return tuple(arm for name in Sewn.arms if isinstance(arm := simulation.arms[name], PsmArm))
+
+
 class Theatre:
     """Both arms and the thread, in place of an environment."""
 
     needle = 0
 
-    def __init__(self, simulation: ligature.Simulation, seed: int, watch: Callable[[], object] = lambda: None) -> None:
-        self.simulation, self._watch = simulation, watch
-        self.arms = tuple(arm for name in Sewn.arms if isinstance(arm := simulation.arms[name], PsmArm))
+    def __init__(self, simulation: ligature.Simulation, goal: Sewn, watch: Callable[[], object] = lambda: None) -> None:
+        self.simulation, self.goal, self._watch = simulation, goal, watch
+        self.arms = hands(simulation)
         self.readings = tuple(ArmReading(simulation, arm) for arm in self.arms)
         self._actions = [
             ArmActions(arm, reading, "cartesian") for arm, reading in zip(self.arms, self.readings, strict=True)
         ]
-        self.goal = Sewn(simulation, self.arms)
-        self.goal.settle()
-        if seed:
-            self.goal.begin(np.random.default_rng(seed))
 
     def run(self, actions: Iterator[Array]) -> None:
         """Have both arms act."""
@@ -317,12 +324,17 @@ def scattered(scene: Scene, seed: int) -> Scene:
     return replace(scene, bodies=type(scene.bodies)([other(body) for body in scene.bodies]))
 
 
-def operate(simulation: ligature.Simulation, seed: int = 0, watch: Callable[[], object] = lambda: None) -> Outcome:
-    """Make the knot, let go, wait; returns how well it went."""
-    try:
-        theatre = Theatre(simulation, seed, watch)
-    except ValueError as error:  # the jaws do not hold the thread
-        raise Failure(str(error)) from error
+def begun(simulation: ligature.Simulation, seed: int) -> Sewn:
+    """The task, its long end in the right hand; raises ValueError where the jaws do not hold the thread."""
+    goal = Sewn(simulation, hands(simulation))
+    goal.settle()
+    if seed:
+        goal.begin(np.random.default_rng(seed))
+    return goal
+
+
+def tie(theatre: Theatre) -> tuple[list[float], str]:
+    """Make the knot, let go, wait; returns the gaps of `Outcome`, and why it stopped, if it did."""
     env: Any = theatre
     knotter, goal, stopped = Knotting(Hand(env, 0)), theatre.goal, ""
     gaps = [goal.gap()]
@@ -338,10 +350,25 @@ def operate(simulation: ligature.Simulation, seed: int = 0, watch: Callable[[], 
     except (Missed, ValueError) as error:
         stopped = str(error)
     gaps.append(goal.gap())
+    return gaps, stopped
+
+
+def judged(theatre: Theatre, gaps: list[float], stopped: str) -> Outcome:
+    """How well it went."""
+    simulation, goal = theatre.simulation, theatre.goal
     kind = Diagram.of(extended(goal.points() - goal.vessel, np.zeros(3))).kind
     empty = all(simulation.grasps[arm.name] is None for arm in theatre.arms)
     sewn = goal.wound.stitch(simulation.state[0], 0.0) is not None
     return Outcome(kind, tuple(gaps), sewn, empty, simulation.time, stopped)
+
+
+def operate(simulation: ligature.Simulation, seed: int = 0, watch: Callable[[], object] = lambda: None) -> Outcome:
+    """Take the long end, make the knot, let go, wait; returns how well it went."""
+    try:
+        theatre = Theatre(simulation, begun(simulation, seed), watch)
+    except ValueError as error:  # the jaws do not hold the thread
+        raise Failure(str(error)) from error
+    return judged(theatre, *tie(theatre))
 
 
 def main() -> int:

@@ -62,6 +62,9 @@ class Failure(RuntimeError):
 class Surgeon:
     """Two arms, a needle, and how they work together."""
 
+    up = UP
+    """Which way the surface of the tissue faces."""
+
     def __init__(
         self, simulation: ligature.Simulation, watch: Callable[[], object] = lambda: None, pairs: int = 1
     ) -> None:
@@ -196,7 +199,7 @@ class Surgeon:
 
     def throw(self, pair: int) -> Throw:
         """The circle through both ends of a throw."""
-        return Throw.through(*self.ends(pair), self.arc.radius, UP)
+        return Throw.through(*self.ends(pair), self.arc.radius, self.up)
 
     def meeting(self, throw: Throw) -> Array:
         """Pose (4, 4) of the arc frame in which the needle is handed over."""
@@ -216,7 +219,7 @@ class Surgeon:
     ) -> Array:
         """Pose (4, 4) of the tool in the arc frame that reaches the whole way, and where the needle is now."""
         kinematics, base = self.arms[name].kinematics, self._base[name]
-        grasp = best_grasp(self.arc, depths, kinematics, base, way, now, self.ends(1)[0], upright)
+        grasp = best_grasp(self.arc, depths, kinematics, base, way, now, self.ends(1)[0], upright, self.up)
         if grasp is None:
             raise Failure(f"{name} has no grasp of the needle that reaches the whole throw")
         return grasp.tool_in_arc(self.arc)

@@ -157,7 +157,7 @@ class TissueSurgeon(Surgeon):
             [np.cos(throw.towards_exit), np.sin(throw.towards_exit), 0.0]
         )
         end = throw.towards_exit + BEYOND
-        while (self.tip() - exit) @ UP < OUT:
+        while (self.tip() - exit) @ self.up < OUT:
             if end > throw.towards_exit + BEYOND + MOST_TURN:
                 raise Failure("the needle's tip did not come out of the tissue")
             self.turn(name, throw, end, end + TURN)

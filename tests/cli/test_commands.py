@@ -192,8 +192,12 @@ def test_demo_names_the_example_that_is_missing(
     assert demo.demo(2, 0, tmp_path, None, Console(soft_wrap=True)) == 0
     (tmp_path / "suture_tissue.py").write_text("import sys; sys.exit(sys.argv[1:3] != ['--seed', '7'])")
     assert demo.demo(2, 7, tmp_path, None, Console(soft_wrap=True), tissue=True) == 0
-    assert demo.demo(2, 7, tmp_path, tmp_path / "d.h5", Console(soft_wrap=True), tissue=True) == 2
-    assert "leave out --tissue, or --dataset" in capsys.readouterr().out
+    (tmp_path / "close_wound.py").write_text("import sys; sys.exit(sys.argv[1:3] != ['--seed', '8'])")
+    for tissue in (False, True):
+        assert demo.demo(2, 8, tmp_path, None, Console(soft_wrap=True), tissue=tissue, knot=True) == 0
+    for option in ("tissue", "knot"):
+        assert demo.demo(2, 7, tmp_path, tmp_path / "d.h5", Console(soft_wrap=True), **{option: True}) == 2
+        assert f"leave out --{option}, or --dataset" in capsys.readouterr().out
 
 
 def test_render_warns_of_a_picture_that_is_mostly_white(tmp_path: Path) -> None:

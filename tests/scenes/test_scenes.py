@@ -23,9 +23,7 @@ from tests.wound import pass_through_the_wound
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 LAUNCHES = sorted(SCENES.glob("*/launch*.yaml"))
-AUTHORS = sorted(
-    path.stem for path in SCENES.glob("author_*.py") if "\ndef texts()" in path.read_text(encoding="utf-8")
-)
+AUTHORS = sorted(path.stem for path in SCENES.glob("author_*.py") if "\ndef texts(" in path.read_text(encoding="utf-8"))
 """Scripts that write files as text; pictures are another matter."""
 
 

@@ -37,21 +37,22 @@ play()
 
 def demo(
     throws: int, seed: int, out: Path, dataset: Path | None, console: Console, episodes: int = 1,
-    sampling: Sampling | None = None, tissue: bool = False,
+    sampling: Sampling | None = None, tissue: bool = False, knot: bool = False,
 ) -> int:  # fmt: skip
     """Run the example, or the one that writes ``dataset`` meanwhile; returns its exit status.
 
-    With ``tissue`` it is the one that sutures soft tissue.
+    With ``tissue`` it is the one that sutures soft tissue, with ``knot`` the one that also makes a knot over it.
     """
-    example = EXAMPLE.with_name("suture_tissue.py") if tissue else EXAMPLE
-    if tissue and dataset is not None:
-        console.print("--dataset writes sutures through holes; leave out --tissue, or --dataset")
+    soft = "--knot" if knot else "--tissue" if tissue else ""
+    example = EXAMPLE.with_name("close_wound.py" if knot else "suture_tissue.py") if soft else EXAMPLE
+    if soft and dataset is not None:
+        console.print(f"--dataset writes sutures through holes; leave out {soft}, or --dataset")
         return 2
     if not example.is_file():
         console.print(f"the demonstration '{example}' is missing; install Ligature again", markup=False)
         return 2
     if dataset is None:
-        count = [] if tissue else ["--throws", str(throws)]
+        count = [] if soft else ["--throws", str(throws)]
         command = [str(example), *count, "--seed", str(seed), "--out", str(out)]
     else:
         words = [str(dataset), "--throws", str(throws), "--seed", str(seed), "--episodes", str(episodes)]

@@ -318,6 +318,7 @@ def demo(
         int, typer.Option(help="Number of throws, beginning at the first pair of holes.", min=1, max=4)
     ] = 2,
     tissue: Annotated[bool, typer.Option("--tissue", help="Suture soft tissue without holes instead.")] = False,
+    knot: Annotated[bool, typer.Option("--knot", help="The same, and a square knot that holds the wound.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the needle's pose; 0 keeps the pose of the scene.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for pictures and an animation.")] = Path("out"),
     dataset: Annotated[Optional[Path], typer.Option(help="HDF5 dataset to write instead of pictures.")] = None,  # noqa: UP045
@@ -332,7 +333,7 @@ def demo(
     if episodes != 1 and dataset is None:
         raise typer.BadParameter("--episodes describes a dataset; add '--dataset FILE.h5'")
     sampling, console = sampling_of(dataset, rate, size, camera), Console(highlight=False, soft_wrap=True)
-    raise typer.Exit(run_demo(throws, seed, out, dataset, console, episodes, sampling, tissue))
+    raise typer.Exit(run_demo(throws, seed, out, dataset, console, episodes, sampling, tissue, knot))
 
 
 @app.command()

@@ -166,7 +166,8 @@ class Joint:
     constraint frame A in the parent's inertial frame, ``T_child_b`` frame B in the child's inertial
     frame. ``T_parent_child_zero`` is the child's body frame in the parent's body frame at
     joint position zero. ``low``/``high`` are None when the joint has no limits. Springs without limits are locked,
-    unless ``freed``: the file gives them the wrong way round, which frees the axis (as in Bullet).
+    unless ``freed``: the file gives them the wrong way round, which frees the axis (as in Bullet). One between a body
+    and a thread lets go above a pull of ``release`` newtons.
     """
 
     index: int
@@ -194,6 +195,7 @@ class Joint:
     motor_enabled: bool = True
     feedback: bool = False
     passive: bool = False
+    release: float = math.inf
     extra: dict[str, Any] = field(default_factory=dict)
 
 

@@ -172,6 +172,7 @@ def _swage(element: Element, identity: Identity, index: int, parent: Body, first
         T_child_b=frame(np.eye(3), (0.0, 0.0, -length / 2)),
         T_parent_child_zero=T_zero,
         passive=True,
+        release=element.number("release force") if element.has("release force") else math.inf,
     )
 
 

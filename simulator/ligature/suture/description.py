@@ -30,7 +30,7 @@ class Attachment:
 
     ``T_element_a`` and ``T_body_b`` (4, 4) are the attached frames in the inertial frames of element and
     body; ``stiffness``, ``damping``, ``rest``, ``low``, ``high`` (3,) are those of the rotation, as in
-    `RodDescription`.
+    `RodDescription`. At a pull above ``release`` newtons it lets go.
     """
 
     element: int
@@ -42,6 +42,7 @@ class Attachment:
     rest: Array
     low: Array
     high: Array
+    release: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,7 +265,7 @@ def _attachment(joint: Joint, elements: tuple[int, ...]) -> Attachment:
     k, d, rest, low, high = _springs(joint, forward)
     if joint.type is JointType.FIXED:
         low = high = np.zeros(3)
-    return Attachment(element, body, a, b, k, d, rest, low, high)
+    return Attachment(element, body, a, b, k, d, rest, low, high, joint.release)
 
 
 def _ends(pivots: Array, attachments: tuple[Attachment, ...], chain: RodChain) -> Array:

@@ -25,6 +25,7 @@ from ligature.suture.partners import JawPads, Partner, PointConstraint
 from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import Elements, bounds, sound, write_elements
 from ligature.suture.point_constraints import FIRST_GRASP_KEY
+from ligature.suture.releasing import Releases
 from ligature.suture.springs import CAPACITY, read_other_loads, springs
 from ligature.suture.ticking import RodTick, tick_rod
 from ligature.tables import table_of
@@ -88,6 +89,8 @@ class Rod:
         self._own = slice(self._first, self._first + n)
         self.joints = chain_joints(description, numbers.head, numbers.tail)
         self._unbent = self.joints.rest.copy()
+        ends = ((0, numbers.head), (len(self._unbent) - 1, numbers.tail))
+        self._releases = Releases(self.joints, [(j, end) for j, end in ends if end], dt)
         self._nodes = chain_nodes(description, self.partners, numbers, dt)
         self.shapes = shapes or layout.no_shapes(n)
         capacity = 256 + 8 * n + 3 * len(numbers.others)
@@ -139,6 +142,7 @@ class Rod:
         nodes.v[:], nodes.w[:] = 0.0, 0.0
         for partner in self.partners:
             nodes.fixed[self.node_of[partner.body]] = partner.fixed
+        self._off = (False,) * len(self._off)
         self.joints.load[:], self.joints.angle[:], self.joints.rest[:] = 0.0, 0.0, self._unbent
         self.constraints, self._pads, self._near = [], (), None
         self._external.clear()
@@ -221,7 +225,17 @@ class Rod:
 
     def hangs_on(self, body: int) -> bool:
         """Whether ``body`` and nothing else holds the rod."""
-        return {*self._attached, *(constraint.body for constraint in self.constraints)} == {body}
+        attached = set(self._attached).difference(self._releases.bodies)
+        return attached.union(constraint.body for constraint in self.constraints) == {body}
+
+    @property
+    def _off(self) -> tuple[bool, ...]:
+        """Which ends have come off what they were attached to."""
+        return self._releases.off
+
+    @_off.setter
+    def _off(self, off: tuple[bool, ...]) -> None:
+        self._releases.set(off)
 
     def carry(self, T: Array) -> None:
         """Move the whole rod by ``T`` (4, 4) in world axes, at rest and without contacts."""
@@ -476,10 +490,13 @@ class Rod:
         _, _, self.newton_steps, _, self._pushed, finite = self._arrays.counts.tolist()
         self.settled_soundly = bool(finite)
         self._touches = tuple(self._buffers[k] for k in self._order.tolist())
+        if self._releases.possible:
+            self._releases.look()
 
     def coasts(self, near: list[int]) -> bool:
         """Whether the coming ticks take nothing but `tick_table`, as long as no other bodies are ``near``."""
-        return near is self._near and not (self._apart or self._pads or self._external or self._pulled)
+        waits = self._apart or self._pads or self._external or self._pulled or self._releases.possible
+        return near is self._near and not waits
 
     def impulse_on(self, body: int) -> Array:
         """Linear and angular impulse (6,) of the last tick on a partner, about its centre of mass."""
@@ -491,5 +508,5 @@ JOINTS_KEPT = ("angle", "load", "rest")
 TOUCHES_KEPT = ("node", "key", "slip", "press", "closed", "mode", "bilateral", "normal", "force", "start")
 """Arrays of nodes, joints and contact points that last from tick to tick."""
 
-_KEPT = ("tension", "impulse", "constraints", "_pads", "newton_steps", "settled_soundly")
+_KEPT = ("tension", "impulse", "constraints", "_pads", "newton_steps", "settled_soundly", "_off")
 """Attributes of a `Rod` that do."""

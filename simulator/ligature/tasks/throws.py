@@ -166,17 +166,18 @@ def best_grasp(
     now: Array,
     surface: Array,
     upright: bool = False,
+    up: Array = UP,
 ) -> NeedleGrasp | None:
     """The grasp farthest from the limits of a tool's joints of those that reach ``way`` (k, 4, 4) without a swing.
 
     It must also reach the needle where it is ``now`` (4, 4), from 15 mm behind, and on the way keep clear of the
-    tissue, whose upper side is level through the point ``surface`` (3,).
+    tissue, whose surface goes through the point ``surface`` (3,) and faces ``up`` (3,).
     """
     T_base = inverse(T_world_base)
     best: tuple[NeedleGrasp, float] | None = None
     for grasp in grasps(depths, upright):
         T_arc_tool = grasp.tool_in_arc(arc)
-        q = reach(kinematics, T_world_base, [T @ T_arc_tool for T in way], surface)
+        q = reach(kinematics, T_world_base, [T @ T_arc_tool for T in way], surface, up=up)
         if q is None:
             continue
         here = now @ T_arc_tool
@@ -196,14 +197,15 @@ def drawn_back(T: Array, way: float) -> Array:
 
 
 def reach(
-    kinematics: Psm, T_world_base: Array, way: Sequence[Array], surface: Array, least: float = LEAST_CLEARANCE
-) -> Array | None:
+    kinematics: Psm, T_world_base: Array, way: Sequence[Array], surface: Array, least: float = LEAST_CLEARANCE,
+    up: Array = UP,
+) -> Array | None:  # fmt: skip
     """Joint values (k, 6) along ``way`` (k, 4, 4) of the tool, without a swing and clear of the tissue; else None."""
     T_base = inverse(T_world_base)
     path = kinematics.inverse(np.array([T_base @ T for T in way]))
     if not path.ok.all() or np.abs(np.diff(path.q, axis=0)).max(initial=0.0) > JUMP:
         return None
-    height = clearance(kinematics, path.q, T_world_base, UP) - float(surface[2])
+    height = clearance(kinematics, path.q, T_world_base, up) - float(surface @ up)
     return None if height < least else np.asarray(path.q)
 
 

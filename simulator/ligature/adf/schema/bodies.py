@@ -361,6 +361,13 @@ SUTURE = (
     Key("location", POSE, POSE_ZERO, "m, rad", "pose of the start; the thread leaves along +z"),
     Key("parent", T, "", doc="body that the start is fixed to; `location` is then in its frame"),
     Key(
+        "release force",
+        N,
+        unit="N",
+        doc="pull above which the parent lets go of the start; never when absent",
+        least=0.0,
+    ),
+    Key(
         "way", Type.MAPS, doc="points in the frame of `location` that the thread leads through from its start at first"
     ),
     *each(("x", "y", "z"), N, "way[].{}", unit="m", doc="{} of the point", required=True),
