@@ -38,6 +38,9 @@ LENGTH, HEADING = 0.170, np.radians(220)
 TURN, TURNED = 0.026, 0.025
 """Radius of the turn that the thread lies in, at which no bend stays, and how far its end is from the tissue."""
 
+CAMERA = (0.0307, 0.316, 0.805)
+"""Where the endoscope is, nearer than elsewhere: it sees the wound and both hands."""
+
 RELEASE = 1.0
 """Pull in newtons at which the needle lets go of the thread: 0.3 to 7 N in patent CA 1042301 of 1978."""
 
@@ -121,7 +124,7 @@ def task(width: float, youngs: float | None, heading: float) -> dict[str, Any]:
     """Tissue, its plate, clip, board, needle, thread and endoscope."""
     start, *points = way(width, heading)
     block, T_needle, T_needle_tail = needle(start, heading)
-    found = theatre.document({"BODY CameraFrame": theatre.camera_frame(), "BODY Needle": block})
+    found = theatre.document({"BODY CameraFrame": theatre.camera_frame(CAMERA), "BODY Needle": block})
     pad = knot.pad(width, youngs)
     pad["ligature tissue"] |= SHARP
     own = {
