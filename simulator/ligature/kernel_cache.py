@@ -18,10 +18,11 @@ import shutil
 import time
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import llvmlite.binding
 from numba.core import caching
+from numba.core.runtime import rtsys
 
 from ligature.cache import CacheError, cache_folder
 
@@ -32,7 +33,7 @@ LONGEST_TURN, POLL = 120.0, 0.02
 """Seconds to wait for another process that compiles the same kernel, and between looks."""
 
 _PACKAGE = Path(__file__).parent
-_KERNEL_SOURCE = re.compile(rb"^\s*@(?:compiled|kernel|inlined|intrinsic|unrolled)\b", re.MULTILINE)
+_KERNEL_SOURCE = re.compile(rb"^[ \t]*@(?:compiled|kernel|inlined|intrinsic|unrolled)\b", re.MULTILINE)
 _IMPORT = re.compile(rb"^from (ligature[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 _DIGESTED = re.compile(r"[0-9a-f]{16}")
 _CONSTANTS = (
@@ -42,46 +43,69 @@ _CONSTANTS = (
 )  # fmt: skip
 """Sources without kernels whose contents are compiled into kernels."""
 
+_WITH_CONSTANTS = frozenset(f"{_PACKAGE}/{name}" for name in _CONSTANTS)
+
 _log = logging.getLogger(__name__)
 
 
+class _Source(NamedTuple):
+    """What a start has to know of a source."""
+
+    digest: bytes
+    has_kernels: bool
+    """Or constants that are compiled into kernels."""
+    imported: frozenset[str]
+    """The files of the package that it imports, as far as imports stand at the start of a line."""
+
+
 @cache
-def _files() -> frozenset[Path]:
-    return frozenset(_PACKAGE.rglob("*.py"))
+def _source(path: str) -> _Source:
+    """One source, which is read once; a start reads a hundred."""
+    with open(path, "rb") as file:
+        content = file.read()
+    has_kernels = path in _WITH_CONSTANTS or _KERNEL_SOURCE.search(content) is not None
+    imported = set[str]()
+    for package, names in _IMPORT.findall(content):
+        folder = "/".join((str(_PACKAGE), *package.decode().split(".")[1:]))
+        words = (word.split() for word in names.decode().strip("()").split(","))
+        imported |= {f"{module}.py" for module in (folder, *(f"{folder}/{word[0]}" for word in words if word))}
+    there = frozenset(file for file in imported if _exists(file))
+    return _Source(hashlib.sha256(content).digest(), has_kernels, there)
+
+
+def _exists(path: str) -> bool:
+    folder, _, name = path.rpartition("/")
+    return name in _names_in(folder)
+
+
+@cache
+def _names_in(folder: str) -> frozenset[str]:
+    """The names of the files in a folder; none where that is a module, of which something is imported."""
+    with contextlib.suppress(OSError):
+        return frozenset(os.listdir(folder))
+    return frozenset()
 
 
 @cache
 def sources() -> frozenset[Path]:
     """The files of the package that kernels are made of."""
-    found = (path for path in _files() if _KERNEL_SOURCE.search(path.read_bytes()))
-    return frozenset({*found, *(_PACKAGE / name for name in _CONSTANTS)})
-
-
-@cache
-def _imported(module: Path) -> set[Path]:
-    """The files of the package that ``module`` imports, as far as imports stand at the start of a line."""
-    found = set()
-    for package, names in _IMPORT.findall(module.read_bytes()):
-        folder = _PACKAGE.joinpath(*package.decode().split(".")[1:])
-        parts = (folder / word.split()[0] for word in names.decode().strip("()").split(",") if word.split())
-        found |= {part.with_suffix(".py") for part in (folder, *parts)} & _files()
-    return found
-
-
-@cache
-def _digest(source: Path) -> bytes:
-    return hashlib.sha256(source.read_bytes()).digest()
+    return frozenset(path for path in _PACKAGE.rglob("*.py") if _source(str(path)).has_kernels)
 
 
 def sources_of(module: Path) -> set[Path]:
     """The files that the kernels of ``module`` are made of: itself, and those of `sources` that it imports."""
-    found, waiting = set[Path](), [module]
+    return set(map(Path, _sources_of(str(module))))
+
+
+def _sources_of(module: str) -> list[str]:
+    """The paths of `sources_of` in their order."""
+    found, waiting = set[str](), [module]
     while waiting:
         path = waiting.pop()
         if path not in found:
             found.add(path)
-            waiting.extend(_imported(path))
-    return {module} | (found & sources())
+            waiting.extend(_source(path).imported)
+    return sorted(path for path in found if path == module or _source(path).has_kernels)
 
 
 @cache
@@ -89,7 +113,7 @@ def kernel_folder(module: Path, name: str) -> Path | None:
     """Where the machine code of the kernels of the module ``name`` lies; None where nothing can be written."""
     if (root := _root()) is None:
         return None
-    made_of = b"".join(_digest(path) for path in sorted(sources_of(module)))
+    made_of = b"".join(_source(path).digest for path in _sources_of(str(module)))
     folder = root / hashlib.sha256(name.encode() + made_of).hexdigest()[:16]
     with contextlib.suppress(OSError):
         folder.mkdir(exist_ok=True)
@@ -182,10 +206,12 @@ class KernelCache(caching.FunctionCache):
     def _loaded(self, sig: Any, target_context: Any) -> Any:
         """The machine code for a signature, if it is kept; files that cannot be read are forgotten.
 
-        A power failure leaves files without content, another user's start files that are his.
+        A power failure leaves files without content, another user's start files that are his. Numba's own method first
+        registers all that can be compiled, which compilation does again, and which takes longer than to load the code.
         """
         try:
-            return super().load_overload(sig, target_context)
+            rtsys.initialize(target_context)  # what machine code calls to allocate memory
+            return self._load_overload(sig, target_context)
         except Exception as error:  # whatever pickle and LLVM raise
             index = Path(self._cache_file._index_path)
             _log.warning("%s cannot be read and is compiled again: %s", index, str(error) or type(error).__name__)
