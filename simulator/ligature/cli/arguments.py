@@ -94,10 +94,11 @@ def sampling_of(dataset: Path | None, rate: float | None, size: str | None, came
 
 def task_name(text: str) -> str:
     """``text``, unless it is given and no task has that name."""
-    from ligature.tasks import TASKS
+    if text:
+        from ligature.tasks import TASKS  # with it the model, which a run's start spares
 
-    if text and text not in TASKS:
-        raise typer.BadParameter(f"unknown task '{text}'; choose one of {', '.join(TASKS)}")
+        if text not in TASKS:
+            raise typer.BadParameter(f"unknown task '{text}'; choose one of {', '.join(TASKS)}")
     return text
 
 

@@ -31,7 +31,6 @@ from ligature.cli.arguments import (
 from ligature.cli.numbers import Commands
 from ligature.cli.options import RunOptions, arm_entry, arm_names, name_prefix, rate_notes
 from ligature.cli.supervisor import supervise
-from ligature.model.softening import requested
 
 app = Commands(
     add_completion=False,
@@ -110,7 +109,10 @@ def run(
     try:
         for text in arms:
             arm_entry(text)
-        requested(soft or ())
+        if soft:
+            from ligature.model.softening import requested  # with it the parser of scenes, which a run's start spares
+
+            requested(soft)
         names_of_arms = arm_names(only)
         name_prefix(namespace)
     except ValueError as error:

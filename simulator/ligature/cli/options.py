@@ -10,7 +10,6 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
 
 import ligature
-from ligature.adf import Diagnostic, Severity
 
 if TYPE_CHECKING:
     from ligature.model.scene import ArmDescription, Camera, Scene
@@ -104,6 +103,8 @@ class RunOptions:
 
     def _permitted(self, scene: Scene) -> Scene:
         """The scene without its plug-ins, unless they are allowed; a finding then names them."""
+        from ligature.adf import Diagnostic, Severity  # the supervisor needs none of it
+
         if self.allow_plugins or not scene.plugins:
             return scene
         names = ", ".join(plugin.name for plugin in scene.plugins)
@@ -113,6 +114,8 @@ class RunOptions:
 
     def _chosen(self, scene: Scene) -> tuple[ArmDescription, ...]:
         """The arms of a scene that are asked for; raises `ligature.SceneError` for one that is missing."""
+        from ligature.adf import Diagnostic, Severity
+
         known = [arm.name for arm in scene.arms]
         missing = [name for name in self.only if name not in known]
         if missing:
