@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import functools
+import gc
 import importlib
 import io
 import os
@@ -67,7 +68,11 @@ def _run(module: str) -> None:
         _have_logs_of_ros()
         take_interrupts()
         try:
-            importlib.import_module(module).main()
+            gc.disable()  # as in `ligature.process`
+            main = importlib.import_module(module).main
+            gc.freeze()
+            gc.enable()
+            main()
         finally:
             sys.stdout.flush()  # what waits to be written is written here, where a failure can still be reported
     except ModuleNotFoundError as error:
