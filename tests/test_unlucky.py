@@ -100,7 +100,7 @@ def test_a_clock_that_jumps_changes_stamps_and_nothing_else(tmp_path: Path, monk
     try:
         run.turn_for(0.2)
         for jump in (3600.0, -7200.0, 1e9, 0.0):
-            monkeypatch.setattr("ligature.cli.physics.time.time", lambda jump=jump: 1.7e9 + jump)
+            monkeypatch.setattr("ligature.cli.loop.time.time", lambda jump=jump: 1.7e9 + jump)
             before, updates = float(run.simulation.state["sim_time"][0]), 0
             while updates < 20:
                 updates += run.turn_for(0.02)
@@ -121,4 +121,4 @@ def test_the_wall_clock_decides_nothing() -> None:
         for path in (ROOT / "simulator" / "ligature").rglob("*.py")
         if "time.time()" in path.read_text("utf-8")
     ]
-    assert sorted(readers) == ["cli/physics.py", "kernel_cache.py"]
+    assert sorted(readers) == ["cli/loop.py", "kernel_cache.py"]

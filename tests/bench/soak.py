@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from ligature.bus import Block
 from ligature.bus.outbox import Outbox
+from ligature.cli.loop import Loop
 from ligature.cli.options import RunOptions, model_indices
-from ligature.cli.physics import Loop
 from ligature.model.frames import matrix_pose7
 from ligature.model.state import new_state
 from ligature.robots.commands import VERBS

@@ -15,8 +15,8 @@ from ligature import Simulation, load
 from ligature.adf import Diagnostic, Mark, Severity
 from ligature.bus import Block, Mailbox, Throttle
 from ligature.bus.codec import Message, encode
+from ligature.cli.loop import Loop
 from ligature.cli.options import RunOptions
-from ligature.cli.physics import Loop
 from ligature.model.commands import (
     MAX_FORCE,
     MAX_POSITION,

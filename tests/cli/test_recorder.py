@@ -16,8 +16,8 @@ from ligature.bus import Block, Recording, Throttle
 from ligature.bus.codec import Message, encode
 from ligature.bus.events import RUN
 from ligature.bus.record import Record
+from ligature.cli.loop import Loop
 from ligature.cli.options import RunOptions
-from ligature.cli.physics import Loop
 from ligature.cli.replay import replay
 from ligature.model.commands import Reset
 from ligature.robots.commands import PlaceJp, ServoJp

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def main() -> None:
-    """Entry point: one argument, the run's options as text."""
+    """Entry point; see `ligature.cli.process`."""
     run_process(_serve)
 
 

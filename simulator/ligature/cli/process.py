@@ -1,6 +1,7 @@
 """Starts every process of a run, and ends it with a message if it cannot take part.
 
-The only argument of a process is the run's options as text; it reports to the supervisor by lines (`ligature.process`).
+The arguments of a process are the run's options as text and the descriptor of the memory that holds the scene; it
+reports to the supervisor by lines (`ligature.process`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import NoReturn
 
 import ligature
 from ligature.bus import Block, BusError
+from ligature.bus.shared_scene import share_scene, shared_scene
 from ligature.bus.stop import Stop, stop_on_signal
 from ligature.cli.options import RunOptions
 from ligature.limits import shortage
@@ -60,11 +62,11 @@ class Run:
 
 
 def run_process(work: Callable[[Run], None], owner: bool = False, early: bool = False) -> None:
-    """Be a process of a run: end with the parent, stop on signals, load the scene, map the shared memory, do ``work``.
+    """Be a process of a run: end with the parent, stop on signals, get the scene, map the shared memory, do ``work``.
 
-    The ``owner``, which simulates, creates the shared memory and reports what is wrong with the scene; all others wait
-    until it has written the first state, unless they are ``early`` and call `Run.await_state` themselves. A process
-    that cannot join ends with a status other than 0.
+    The ``owner``, which simulates, loads the scene, reports what is wrong with it and creates the shared memory; all
+    others take the scene from there and wait until the first state has been written, unless they are ``early`` and
+    call `Run.await_state` themselves. A process that cannot join ends with a status other than 0.
     """
     end_with_parent()
     stop = stop_on_signal()
@@ -82,21 +84,29 @@ def _join(work: Callable[[Run], None], stop: Stop, owner: bool, early: bool) -> 
     gc.disable()  # nothing that a start makes is garbage: looking for it takes a fifth of the time
     options = RunOptions.from_text(sys.argv[1])
     try:
-        scene = options.load()
+        run = _own(options, stop) if owner else _attached(options, stop, early)
     except ligature.SceneError as error:
         _leave(stop, owner, [str(diagnostic) for diagnostic in error.diagnostics], 2)
-    try:
-        dtype = state_dtype(scene)
-        if owner:
-            block = Block.create(options.bus, dtype)
-        else:
-            block = Block.attach(options.bus, dtype, cancelled=stop.is_set, empty=early)
     except BusError as error:
         _leave(stop, owner, [str(error)], 1)
     gc.freeze()
     if not owner:
         gc.enable()
-    work(Run(options, scene, stop, block))
+    work(run)
+
+
+def _own(options: RunOptions, stop: Stop) -> Run:
+    """The run of the physics process, which hands the scene to the others."""
+    scene = options.load()
+    run = Run(options, scene, stop, Block.create(options.bus, state_dtype(scene)))
+    share_scene(int(sys.argv[2]), scene)
+    return run
+
+
+def _attached(options: RunOptions, stop: Stop, early: bool) -> Run:
+    """The run of any other process."""
+    scene = shared_scene(int(sys.argv[2]), stop.is_set)
+    return Run(options, scene, stop, Block.attach(options.bus, state_dtype(scene), cancelled=stop.is_set, empty=early))
 
 
 def _leave(stop: Stop, owner: bool, problems: list[str], status: int) -> NoReturn:

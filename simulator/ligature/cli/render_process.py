@@ -34,7 +34,7 @@ NAP = 0.05
 
 
 def main() -> None:
-    """Entry point: one argument, the run's options as text."""
+    """Entry point; see `ligature.cli.process`."""
     run_process(_draw)
 
 

@@ -23,7 +23,7 @@ HAPTIC_RATE = 1000.0
 
 
 def main() -> None:
-    """Entry point: one argument, the run's options as text."""
+    """Entry point; see `ligature.cli.process`."""
     run_process(_serve, early=True)
 
 

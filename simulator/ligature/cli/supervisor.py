@@ -20,7 +20,6 @@ from rich.text import Text
 
 from ligature.bus.leftovers import remove, remove_leftovers
 from ligature.bus.stop import END_TIMEOUT, Stop, stop_on_signal
-from ligature.cli import master
 from ligature.cli.options import RunOptions
 from ligature.cli.ros_packages import ros_problem
 from ligature.process import end_with_parent, lower_priority, program
@@ -87,9 +86,11 @@ class Child:
     """One process of a run and the thread that listens to it."""
 
     def __init__(
-        self, name: str, command: Sequence[str], events: Queue[Event], env: dict[str, str], nice: int = 0
-    ) -> None:
+        self, name: str, command: Sequence[str], events: Queue[Event], env: dict[str, str], nice: int = 0,
+        inherited: Sequence[int] = (),
+    ) -> None:  # fmt: skip
         self.name, self._command, self._events, self._env, self._nice = name, list(command), events, env, nice
+        self._inherited = inherited
         self.quick_deaths = 0
         self.start()
 
@@ -99,6 +100,7 @@ class Child:
         self.process = subprocess.Popen(
             self._command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8", errors="replace",
             bufsize=1, env=self._env, preexec_fn=self._prepare, start_new_session=True,
+            pass_fds=self._inherited,
         )  # fmt: skip
         threading.Thread(target=self._listen, args=(self.process,), daemon=True).start()
 
@@ -138,6 +140,7 @@ class Supervisor:
         self._console = console
         self._progress = self._console.status("loading the scene")
         self._events: Queue[Event] = Queue()
+        self._scene = os.memfd_create("ligature-scene")  # physics puts it there for all other processes
         self._children: dict[str, Child] = {}
         self._begin = time.monotonic()
         self._published = self._over = False
@@ -176,23 +179,26 @@ class Supervisor:
             self._fail(problem)
             return
         self._progress.start()
-        text = self._options.to_text()
-        self._children["physics"] = Child("physics", program("ligature.cli.physics", text), self._events, self._env)
+        self._start_process("physics", "ligature.cli.physics")
         if self._options.ros and self._master_begun():
-            self._children["ros"] = Child("ros", program("ligature.cli.ros_process", text), self._events, self._env)
+            self._start_process("ros", "ligature.cli.ros_process")
             if self._master_answers() and self._options.task:
-                self._children["tasks"] = Child(
-                    "tasks", program("ligature.cli.tasks_process", text), self._events, self._env
-                )
+                self._start_process("tasks", "ligature.cli.tasks_process")
+
+    def _start_process(self, name: str, module: str, nice: int = 0) -> None:
+        """Start a process of `ligature.cli.process`."""
+        command = program(module, self._options.to_text(), str(self._scene))
+        self._children[name] = Child(name, command, self._events, self._env, nice, [self._scene])
 
     def _start_drawing(self, name: str, module: str, nice: int = _DRAWING_NICE) -> None:
         """Start a process that draws, by default at a lower scheduling priority; without a master the run is over."""
         if "ros" in self._children or not self._options.ros:
-            command = program(module, self._options.to_text())
-            self._children[name] = Child(name, command, self._events, self._env, nice)
+            self._start_process(name, module, nice)
 
     def _master_begun(self) -> bool:
         """Whether a ROS master answers or was started now, which may take another second to answer."""
+        from ligature.cli import master  # HTTP, which physics does not wait for
+
         uri = self._env["ROS_MASTER_URI"] = self._env.get("ROS_MASTER_URI") or master.DEFAULT_MASTER
         if master.master_answers(uri):
             self._print(f"using the ROS master at {uri}")
@@ -207,6 +213,8 @@ class Supervisor:
 
     def _master_answers(self) -> bool:
         """Wait until the started master answers; the run ends when it does not."""
+        from ligature.cli import master
+
         child, uri = self._children.get("master"), self._env["ROS_MASTER_URI"]
         if child is None:
             return True
@@ -296,6 +304,7 @@ class Supervisor:
         for child in order:
             child.end(deadline - time.monotonic())
         remove(self._options.bus)
+        os.close(self._scene)
         self._print("ended")
 
     def _print(self, text: str, style: str = "") -> None:

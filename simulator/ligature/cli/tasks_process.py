@@ -9,7 +9,7 @@ from ligature.process import report
 
 
 def main() -> None:
-    """Entry point: one argument, the run's options as text."""
+    """Entry point; see `ligature.cli.process`."""
     run_process(_judge)
 
 

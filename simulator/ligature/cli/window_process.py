@@ -20,7 +20,7 @@ SMOOTHING = 0.1
 
 
 def main() -> None:
-    """Entry point: one argument, the run's options as text."""
+    """Entry point; see `ligature.cli.process`."""
     run_process(_show)
 
 

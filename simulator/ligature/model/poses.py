@@ -34,6 +34,31 @@ def compose_rows(parents: Array, locals_: Array, rows: NDArray[np.int64], out: A
         compose(parents[i], locals_[i], out[rows[i]])
 
 
+@compiled
+def write_pose(T: Array, pose: Array) -> None:
+    """Pose (7,) of ``T`` (4, 4), as `ligature.model.frames.matrix_pose7` has it."""
+    squares = (T[0, 0] - T[1, 1] - T[2, 2], T[1, 1] - T[0, 0] - T[2, 2],
+               T[2, 2] - T[0, 0] - T[1, 1], T[0, 0] + T[1, 1] + T[2, 2])  # fmt: skip
+    i = 0
+    for k in range(1, 4):
+        if squares[k] > squares[i]:
+            i = k
+    q = pose[3:7]
+    if i == 3:
+        q[0], q[1], q[2] = T[2, 1] - T[1, 2], T[0, 2] - T[2, 0], T[1, 0] - T[0, 1]
+        q[3] = 1.0 + squares[3]
+    else:
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q[i] = 1.0 + squares[i]
+        q[j], q[k], q[3] = T[j, i] + T[i, j], T[k, i] + T[i, k], T[k, j] - T[j, k]
+    length = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    if q[3] < 0.0:
+        length = -length
+    for k in range(4):
+        q[k] /= length
+    pose[0], pose[1], pose[2] = T[0, 3], T[1, 3], T[2, 3]
+
+
 def pose7_matrices(poses: Array) -> Array:
     """Homogeneous matrices (n, 4, 4) of ``poses`` (n, 7); quaternions are normalised."""
     q = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)

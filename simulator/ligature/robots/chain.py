@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ligature.kernels import compiled
-from ligature.robots.poses import write_pose
+from ligature.model.poses import write_pose
 
 Array = NDArray[np.float64]
 
