@@ -17,7 +17,7 @@ SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
 
 @pytest.fixture
-def memory() -> Iterator[int]:
+def shared() -> Iterator[int]:
     """Memory of a run."""
     descriptor = os.memfd_create("scene")
     yield descriptor
@@ -29,39 +29,39 @@ def _never() -> bool:
 
 
 @pytest.mark.parametrize("name", ["suturing_small", "soft_suturing", "peg_transfer"])
-def test_the_scene_of_the_others_is_that_of_physics(name: str, memory: int) -> None:
+def test_the_scene_of_the_others_is_that_of_physics(name: str, shared: int) -> None:
     scene = load(SCENES / name / "launch.yaml")
-    share_scene(memory, scene)
+    share_scene(shared, scene)
     for _ in range(2):  # one that starts again gets it, too
-        found = shared_scene(memory, _never)
+        found = shared_scene(shared, _never)
         assert repr(found) == repr(scene)
         assert state_dtype(found) == state_dtype(scene)
 
 
-def test_the_scene_moves_with_the_same_bits(memory: int) -> None:
+def test_the_scene_moves_with_the_same_bits(shared: int) -> None:
     scene = load(SCENES / "needle_pick" / "launch.yaml")
-    share_scene(memory, scene)
+    share_scene(shared, scene)
     hashes = []
-    for each in (scene, shared_scene(memory, _never)):
+    for each in (scene, shared_scene(shared, _never)):
         with Simulation(each) as simulation:
             simulation.step(100)
             hashes.append(simulation.state_hash())
     assert hashes[0] == hashes[1]
 
 
-def test_it_is_taken_when_all_of_it_is_there(memory: int) -> None:
+def test_it_is_taken_when_all_of_it_is_there(shared: int) -> None:
     scene = load(SCENES / "suturing_small" / "launch.yaml")
     found = []
-    waiting = threading.Thread(target=lambda: found.append(shared_scene(memory, _never)))
+    waiting = threading.Thread(target=lambda: found.append(shared_scene(shared, _never)))
     waiting.start()
-    os.pwrite(memory, b"a part", 8)
+    os.pwrite(shared, b"a part", 8)
     waiting.join(0.05)
     assert waiting.is_alive()
-    share_scene(memory, scene)
+    share_scene(shared, scene)
     waiting.join(10.0)
     assert [len(each.bodies) for each in found] == [len(scene.bodies)]
 
 
-def test_a_wait_ends_when_it_is_asked_to(memory: int) -> None:
+def test_a_wait_ends_when_it_is_asked_to(shared: int) -> None:
     with pytest.raises(BusError, match="no physics process has loaded the scene"):
-        shared_scene(memory, lambda: True)
+        shared_scene(shared, lambda: True)

@@ -21,18 +21,18 @@ _LENGTH = 8
 """Bytes of the length of what follows; 0 until it is there."""
 
 
-def share_scene(memory: int, scene: Scene) -> None:
-    """Hand a ``scene`` to all processes that have the file descriptor ``memory``, of an empty file."""
+def share_scene(shared: int, scene: Scene) -> None:
+    """Hand a ``scene`` to all processes that have the file descriptor ``shared``, of an empty file."""
     content = pickle.dumps(scene, pickle.HIGHEST_PROTOCOL)
-    os.pwrite(memory, content, _LENGTH)
-    os.pwrite(memory, len(content).to_bytes(_LENGTH, "little"), 0)
+    os.pwrite(shared, content, _LENGTH)
+    os.pwrite(shared, len(content).to_bytes(_LENGTH, "little"), 0)
 
 
-def shared_scene(memory: int, cancelled: Callable[[], bool]) -> Scene:
-    """The scene in ``memory`` as soon as it is there; raises `BusError` when the wait is ``cancelled``."""
+def shared_scene(shared: int, cancelled: Callable[[], bool]) -> Scene:
+    """The scene in ``shared`` as soon as it is there; raises `BusError` when the wait is ``cancelled``."""
     while not cancelled():
-        if length := int.from_bytes(os.pread(memory, _LENGTH, 0), "little"):
-            scene: Scene = pickle.loads(os.pread(memory, length, _LENGTH))  # noqa: S301 (physics wrote it)
+        if length := int.from_bytes(os.pread(shared, _LENGTH, 0), "little"):
+            scene: Scene = pickle.loads(os.pread(shared, length, _LENGTH))  # noqa: S301 (physics wrote it)
             return scene
         time.sleep(_NAP)
     raise BusError("no physics process has loaded the scene; 'ligature run' starts one")
