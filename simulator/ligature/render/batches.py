@@ -23,6 +23,10 @@ INSTANCE = np.dtype([("model_view", "f4", (4, 4)), ("ids", "i4", 2)])
 _VERTEX = (("aPosition", 3), ("aNormal", 3), ("aTexCoord", 2), ("aTangent", 4))
 
 
+PATIENCE = 300
+"""Moments that something has to stay where it is, down to the last bit, before it stands still."""
+
+
 class Batch:
     """Buffers of one set of triangles, and the pieces that are drawn with them.
 
@@ -132,15 +136,25 @@ class Instances:
         self._coarse = np.array([{None: 0, False: -1, True: 1}[piece.coarse] for piece in pieces], dtype=np.int8)
         self.ids = np.array([(piece.owner + 1, index + 1) for index, piece in enumerate(pieces)], dtype="i4")
         self.ids = self.ids.reshape(-1, 2)  # a scene may have nothing to see
+        self.T_world_piece = np.full((len(pieces), 4, 4), np.nan)
+        self._stayed = np.full(len(pieces), PATIENCE)  # what has never moved stands still
+
+    @property
+    def still(self) -> NDArray[np.bool_]:
+        """Which instances stand still."""
+        return self._stayed > PATIENCE
 
     def place(self, T_world_owner: Array) -> None:
         """Move everything along with its owners (n, 4, 4)."""
-        self.T_world_piece = T_world_owner[self.owners] @ self._T_owner_piece
+        before, self.T_world_piece = self.T_world_piece, T_world_owner[self.owners] @ self._T_owner_piece
+        moved = (before != self.T_world_piece).any(axis=(1, 2)) & ~np.isnan(before[:, 0, 0])
+        self._stayed = np.where(moved, 0, self._stayed + 1)
         centres = np.einsum("nij,nj->ni", self.T_world_piece[:, :3, :3], self._centres)
         self.world_centres = centres + self.T_world_piece[:, :3, 3]
 
     def reach(self, row: int, triangles: Triangles) -> None:
-        """Take the bounds of instance ``row`` from its new ``triangles``."""
+        """Take the bounds of instance ``row`` from its new ``triangles``; it does not stand still."""
+        self._stayed[row] = 0
         sphere = _bounding_sphere(triangles)
         self._centres[row], self.radii[row] = sphere[:3], sphere[3]
         self.world_centres[row] = self.T_world_piece[row, :3, :3] @ sphere[:3] + self.T_world_piece[row, :3, 3]

@@ -7,7 +7,7 @@ A light shines along +X of its frame (as in AMBF). Metres and radians. Nothing h
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
 import moderngl
@@ -74,6 +74,16 @@ HEADLIGHT = LightSettings(cutoff=np.pi / 2)
 """Light at the eye for scenes without lights."""
 
 
+@dataclass(frozen=True, eq=False)
+class ShadowView:
+    """What the shadow map of light ``index`` shows, ``size`` texels wide: its ``view`` and ``projection`` (4, 4)."""
+
+    index: int
+    size: int
+    view: Array
+    projection: Array
+
+
 class Lights:
     """The lights of a scene: settings, and for each picture their places and shadow maps."""
 
@@ -83,6 +93,7 @@ class Lights:
         self._headlight = not self.settings
         self._maps: dict[tuple[int, int], _ShadowMap] = {}
         self._shadows: list[tuple[int, _ShadowMap, Array]] = []
+        self.shadow_views: list[ShadowView] = []
 
     @property
     def defines(self) -> dict[str, int]:
@@ -100,33 +111,41 @@ class Lights:
             T_eye_light[:3, 0] = 0, 0, -1
             self._T_world_light, self._used = (inverse(view) @ T_eye_light)[None], [HEADLIGHT]
         self._T_eye_light = view @ self._T_world_light
+        self.shadow_views = []
 
-    def cast(
-        self, draw: Callable[[Array, Array, int], None], scene: Sphere, seen: Sphere, view: Array, moment: bytes
-    ) -> None:
-        """Draw the shadow maps: ``draw(view, projection, size)`` draws every caster.
+    def content(self) -> Hashable:
+        """All that what the lights do depends on, apart from what throws shadows."""
+        views = ((shadow.view.tobytes(), shadow.projection.tobytes()) for shadow in self.shadow_views)
+        return tuple(self._used), self._T_world_light.tobytes(), *views
+
+    def aim(self, scene: Sphere, seen: Sphere) -> None:
+        """Set what the shadow maps show.
 
         Spheres are given by centre (3,) and radius, in world axes: casters and what is ``seen`` of their shadows lie
-        within the second. A spot's map reaches for the whole ``scene`` and so is the same for both eyes: it is drawn
-        once for each ``moment``, which is all that moves.
+        within the second. A spot's map reaches for the whole ``scene`` and so is the same for both eyes.
         """
-        self._shadows = []
+        self.shadow_views = []
         for index, settings in enumerate(self._used):
-            size = settings.shadow_size
-            if not size or len(self._shadows) == MAX_SHADOWS:
-                continue
-            shadow = self._maps.get((index, size))
-            if shadow is None:
-                shadow = self._maps[index, size] = _ShadowMap(self._context, size)
-            sphere = scene if settings.kind is LightKind.SPOT else seen
-            light, projection = light_camera(settings, self._T_world_light[index], *sphere)
-            content = (moment, light.tobytes(), projection.tobytes())
+            if settings.shadow_size and len(self.shadow_views) < MAX_SHADOWS:
+                sphere = scene if settings.kind is LightKind.SPOT else seen
+                view, projection = light_camera(settings, self._T_world_light[index], *sphere)
+                self.shadow_views.append(ShadowView(index, settings.shadow_size, view, projection))
+
+    def cast(self, draw: Callable[[ShadowView], None], view: Array, moment: bytes) -> None:
+        """Draw the shadow maps, once for each ``moment``, which is all that moves; ``draw`` draws every caster."""
+        self._shadows = []
+        for aimed in self.shadow_views:
+            key = aimed.index, aimed.size
+            if key not in self._maps:
+                self._maps[key] = _ShadowMap(self._context, aimed.size)
+            shadow = self._maps[key]
+            content = (moment, aimed.view.tobytes(), aimed.projection.tobytes())
             if shadow.content != content:
                 shadow.use()
-                draw(light, projection, size)
+                draw(aimed)
                 shadow.content = content
-            self._shadows.append((index, shadow, TO_TEXTURE @ projection @ light @ inverse(view)))
-            shadow.spread = 2.0 / (abs(projection[0, 0]) * size)
+            self._shadows.append((aimed.index, shadow, TO_TEXTURE @ aimed.projection @ aimed.view @ inverse(view)))
+            shadow.spread = 2.0 / (abs(aimed.projection[0, 0]) * aimed.size)
 
     def bind(self, program: Program) -> None:
         """Fill the lights' uniforms of a built-in program; those that cast shadows come first."""
@@ -175,9 +194,14 @@ def light_camera(settings: LightSettings, T_world_light: Array, centre: Array, r
         return view, projection
     view[:3, 3] = -R @ origin
     depth = float((centre - origin) @ x)
-    far = max(depth + radius, 1e-3)
-    near = max(depth - radius, far / 1000.0)
+    far = _step(max(depth + radius, 1e-3), np.ceil)
+    near = max(_step(max(depth - radius, 1e-6), np.floor), far / 1000.0)
     return view, perspective(min(2.0 * settings.cutoff, WIDEST_SHADOW), 1.0, near, far)
+
+
+def _step(distance: float, towards: Callable[[float], float]) -> float:
+    """``distance`` in steps of 2 %, so that what stands still has the same depth for a light while others move."""
+    return float(2.0 ** (towards(32.0 * np.log2(distance)) / 32.0))
 
 
 class _ShadowMap:

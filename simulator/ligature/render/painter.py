@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import moderngl
 import numpy as np
@@ -12,8 +12,9 @@ from ligature.adf import AdfError, Resolver
 from ligature.model.shapes import ShaderFiles
 from ligature.model.state import MAX_PUNCTURES
 from ligature.render import legacy
-from ligature.render.batches import Batch, Seen
+from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
+from ligature.render.kept import Box, is_still
 from ligature.render.lights import Lights
 from ligature.render.programs import Program, Programs
 from ligature.render.sky import Sky
@@ -66,7 +67,7 @@ class Brushes:
             defines["DEFORMS"] = 1
         if batch.rays is not None:
             defines |= batch.rays.defines
-        if batch.primitive is not None and list(passes) != ["rgb"]:
+        if batch.primitive is not None and set(passes) - {"places"} != {"rgb"}:
             defines["ANALYTIC"] = batch.primitive[0]
         return self._programs.get("surface", defines)
 
@@ -87,6 +88,8 @@ class Painter:
         self._before = before
         self.behind: moderngl.Texture | None = None
         """Depth of all that is opaque, for the colours of volumes with a transfer function."""
+        self._kept: frozenset[Batch] = frozenset()
+        self._box: Box | None = None
         self._ready: set[Program] = set()
         self._calls = [(batch, rows) for batch in batches if len(rows := seen.rows(batch))]
 
@@ -99,6 +102,21 @@ class Painter:
         """Whether colour cannot be written together with the rest: by blending, or by scene files' programs."""
         own = self._brushes.own
         return any(not b.opaque or own(shaders) or own(b.shaders) for b, _ in self._calls)
+
+    def begin_with(self, kept: frozenset[Batch], box: Box | None) -> None:
+        """Draw what is ``kept``, with which the picture begins, in ``box`` alone, and nowhere when that is None."""
+        self._kept, self._box = kept, box
+
+    def keepable(self, instances: Instances) -> frozenset[Batch]:
+        """Batches in the picture that look as before until something throws a shadow on them."""
+        return frozenset(
+            batch
+            for batch, _ in self._calls
+            if batch.opaque
+            and batch.marks is None
+            and is_still(batch, instances)
+            and not self._brushes.own(batch.shaders)
+        )
 
     @property
     def needs_depth_behind(self) -> bool:
@@ -134,14 +152,23 @@ class Painter:
         buffer.depth_mask = True
 
     def paint_opaque(
-        self, buffer: moderngl.Framebuffer, passes: Sequence[str], shaders: ShaderFiles | None = None
+        self,
+        buffer: moderngl.Framebuffer,
+        passes: Sequence[str],
+        shaders: ShaderFiles | None = None,
+        only: Collection[Batch] | None = None,
     ) -> None:
-        """Draw ``passes`` of the opaque, from near to far."""
+        """Draw ``passes`` of the opaque, or of those that are named ``only``, from near to far."""
         self._context.enable_only(moderngl.DEPTH_TEST)
         buffer.use()
-        opaque = [(batch, rows) for batch, rows in self._calls if batch.opaque]
+        opaque = [(batch, rows) for batch, rows in self._calls if batch.opaque and (only is None or batch in only)]
         for batch, rows in sorted(opaque, key=lambda call: float(self._seen.depth[call[1]].min())):
-            self._draw(batch, passes, rows, shaders)
+            if batch not in self._kept:
+                self._draw(batch, passes, rows, shaders)
+            elif self._box is not None:
+                buffer.scissor = self._box
+                self._draw(batch, passes, rows, shaders)
+                buffer.scissor = None  # type: ignore[assignment]
 
     def _draw(self, batch: Batch, passes: Sequence[str], rows: NDArray[np.int64], shaders: ShaderFiles | None) -> None:
         (self._context.enable if batch.closed else self._context.disable)(moderngl.CULL_FACE)

@@ -22,7 +22,8 @@ from ligature.model.shapes import ShaderFiles
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
 from ligature.render.context import create_context, draws_on_processor
-from ligature.render.lights import Lights, LightSettings
+from ligature.render.kept import Keeper, Kept
+from ligature.render.lights import Lights, LightSettings, ShadowView
 from ligature.render.look import Look, brighter, tinted
 from ligature.render.movement import Movement
 from ligature.render.outlines import smoothed
@@ -122,6 +123,7 @@ class Renderer:
         """Triangles of the last picture, what lies outside it and what is drawn coarsely taken off."""
         resolver = Resolver(scene.roots) if scene.roots else None
         self._brushes = Brushes(self._context, self._programs, self._textures, self._lights, resolver, self.problems)
+        self._keeper = Keeper(self._context, self._lights)
         self._brushes.prepare(batch.shaders for batch in self._batches)
         self._brushes.prepare(camera.preprocessing_shaders for camera in scene.cameras)
         self._sky = Sky.of(self._context, scene, resolver, self.problems)
@@ -144,6 +146,7 @@ class Renderer:
         stated = [LightSettings.of(light) for light in self._scene.lights[: len(self._lights.settings)]]
         factors = [*look.brightness, *[1.0] * len(stated)]
         self._lights.settings[:] = [brighter(light, factors[k]) for k, light in enumerate(stated)]
+        self._keeper.forget()
         for batch, surface in zip(self._batches, self._surfaces, strict=True):
             tint = look.tints.get(batch.pieces[0].owner)
             batch.surface = surface if tint is None else tinted(surface, tint)
@@ -158,6 +161,11 @@ class Renderer:
     def triangles(self) -> int:
         """Triangles of the whole scene, none of them culled."""
         return sum(len(batch.triangles.faces) * len(batch.pieces) for batch in self._batches)
+
+    @property
+    def kept_pictures(self) -> int:
+        """Pictures of what stands still that are kept; other pictures begin with them on a software rasteriser."""
+        return len(self._keeper)
 
     def render(
         self,
@@ -209,10 +217,13 @@ class Renderer:
         self._lights.place(pose7_matrices(state["light_world"][0]), view.view)
         target = self._target(view, passes, 0 if shaders else self._samples)
         seen = self._instances.seen(view.view, view.projection, view.height, COARSE_BELOW)
-        if "rgb" in target.passes:
-            self._cast_shadows(seen, view, moment)
+        casts = "rgb" in target.passes and self._aim_lights(seen)
         before = self._movement.before(self._instances, view, self._deforming) if "flow" in target.passes else None
         painter = Painter(self._context, self._brushes, self._batches, seen, view, before)
+        apart = bool(self._samples) or painter.needs_colour_apart(shaders)
+        kept = self._kept(painter, target, view, casts) if self._smoothed and not shaders and not apart else None
+        if casts:
+            self._cast_shadows(view, moment)
         self.drawn_triangles = painter.triangles
         if "rgb" in target.passes and painter.needs_depth_behind:
             opaque = self._target(view, ["depth"], 0)
@@ -221,8 +232,12 @@ class Renderer:
             painter.behind = opaque.texture("depth")
             self._targets.append(opaque)
         sky = self._sky if shaders is None else None
-        apart = bool(self._samples) or painter.needs_colour_apart(shaders)
-        target.clear(BACKGROUND, apart)
+        if kept is None:
+            target.clear(BACKGROUND, apart)
+        else:
+            casters = [batch for batch in self._batches if batch.surface.opaque]
+            stirred = self._keeper.stirred(moment, casters, self._instances)
+            painter.begin_with(kept.batches, kept.begin(target, stirred))
         if target.colour is not None and apart:
             painter.paint(target.colour, ["rgb"], shaders, sky)
             if target.geometry is not None:
@@ -324,25 +339,51 @@ class Renderer:
         for rays in self._rays:
             rays.update(state["volume_value"][0])
 
-    def _cast_shadows(self, seen: Seen, view: CameraView, moment: bytes) -> None:
-        """Draw the shadow maps of what may throw shadows into the picture of the state at ``moment``."""
+    def _kept(self, painter: Painter, target: Target, view: CameraView, casts: bool) -> Kept | None:
+        """What is kept of the picture of ``view`` that is to be drawn to ``target``."""
+        if "rgb" not in target.passes or "flow" in target.passes or painter.needs_depth_behind:
+            return None
+        keepable = painter.keepable(self._instances)
+        if not keepable:
+            return None
+
+        def draw(blank: Target, buffer: moderngl.Framebuffer) -> None:
+            if casts:
+                self._cast_shadows(view, b"", self._instances.still)
+            buffer.clear()
+            blank.clear(BACKGROUND, apart=False)
+            painter.paint_opaque(buffer, [*target.passes, "places"], only=keepable)
+
+        picture = view.view.tobytes(), view.projection.tobytes()
+        return self._keeper.kept(target, picture, keepable, self._instances, draw)
+
+    def _aim_lights(self, seen: Seen) -> bool:
+        """Have the lights look at what may throw shadows into the picture; whether there is anything."""
         if "SHADOWS" not in self._lights.defines or not seen.mask.any():
-            return
+            return False
         small = self._instances.radii < LARGE
         near = seen.mask & small if (seen.mask & small).any() else seen.mask
         scene = self._instances.around(small if small.any() else near)
+        self._lights.aim(scene, self._instances.around(near))
+        return True
+
+    def _cast_shadows(self, view: CameraView, moment: bytes, casters: NDArray[np.bool_] | None = None) -> None:
+        """Draw the shadow maps of the state at ``moment``, or of instances that are ``casters`` alone."""
         context = self._context
         context.enable_only(moderngl.DEPTH_TEST)
         context.polygon_offset = (1.5, 2.0)
-        self._lights.cast(self._draw_shadow, scene, self._instances.around(near), view.view, moment)
+        self._lights.cast(partial(self._draw_shadow, casters), view.view, moment)
         context.polygon_offset = (0.0, 0.0)
 
-    def _draw_shadow(self, view: Array, projection: Array, size: int) -> None:
+    def _draw_shadow(self, casters: NDArray[np.bool_] | None, shadow: ShadowView) -> None:
+        view, projection = shadow.view, shadow.projection
         meshes = self._programs.get("shadow", {})
         meshes.write("uProjection", projection)
-        seen = self._instances.seen(view, projection, size, COARSE_BELOW)
+        seen = self._instances.seen(view, projection, shadow.size, COARSE_BELOW)
         for batch in self._batches:
             rows = seen.rows(batch)
+            if casters is not None and (batch.rays is not None or not casters[batch.rows].all()):
+                continue
             if not len(rows) or not batch.surface.opaque:
                 continue
             if batch.rays is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -70,7 +70,7 @@ class Target:
         self.size, self.samples = size, samples
         self.passes = [name for name in PASSES if name in passes]
         self._textures = {name: context.texture(size, n, dtype=t) for name in self.passes for n, t in [PASSES[name]]}
-        depth = context.depth_renderbuffer(size)
+        self._depths = depth = context.depth_texture(size)
         rest = [self._textures[name] for name in self.passes if name != "rgb"]
         self.geometry = context.framebuffer(rest, depth) if rest else None
         self.whole = context.framebuffer(list(self._textures.values()), depth)
@@ -92,6 +92,25 @@ class Target:
         colour = self.colour if apart else self.behind
         if colour is not None:
             colour.clear(*background)
+
+    def with_places(self, places: moderngl.Texture) -> moderngl.Framebuffer:
+        """The ``whole`` with one texture more."""
+        return self._context.framebuffer([*self._textures.values(), places], self._depths)
+
+    def fill(self, contents: Mapping[str, NDArray[Any]], depths: NDArray[np.float32]) -> None:
+        """Begin a picture with the ``contents`` and ``depths`` of another one."""
+        for name, content in contents.items():
+            self._textures[name].write(content)
+        self._depths.write(depths)
+
+    def contents(self) -> dict[str, NDArray[Any]]:
+        """What is in the textures, for `fill`."""
+        return {name: np.frombuffer(self._textures[name].read(), dtype="u1") for name in self.passes}
+
+    def depths(self) -> NDArray[np.float32]:
+        """Depths (h, w) from 0 to 1 of the ``whole``, rows upwards."""
+        width, height = self.size
+        return np.frombuffer(self._depths.read(alignment=1), dtype="f4").reshape(height, width)
 
     def texture(self, name: str) -> moderngl.Texture:
         """Where the pass of that name is drawn."""

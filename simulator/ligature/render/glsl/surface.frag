@@ -79,6 +79,9 @@ layout(location = PASS_NORMALS) out vec4 fNormal;
 #ifdef PASS_FLOW
 layout(location = PASS_FLOW) out vec2 fFlow;
 #endif
+#ifdef PASS_PLACES
+layout(location = PASS_PLACES) out vec4 fPlaces;
+#endif
 
 #ifdef MARKS
 uniform int uMarkCount;
@@ -172,6 +175,33 @@ vec4 gathered(Ray ray, vec3 toEye) {
 }
 #endif
 
+#ifdef PASS_RGB
+// Colour of a place of a surface; in alpha how opaque it is, or what tells it apart.
+vec4 colourOf(vec3 eye, vec3 normal, vec3 toEye) {
+    vec4 colour;
+#ifdef TEXTURED
+    vec4 texel = texture(uTexture, vTexCoord);
+#else
+    vec4 texel = vec4(1.0);
+#endif
+#ifdef MARKS
+    texel.rgb *= marked(eye);
+#endif
+#ifdef PHYSICAL
+    colour.rgb = physical(uDiffuse * texel.rgb, eye, shadedNormal(normal), toEye);
+#else
+    colour.rgb = phong(texel.rgb, eye, shadedNormal(normal), toEye);
+#endif
+#ifdef CLEAR
+    colour.a = uAlpha * texel.a;
+#else
+    // not needed for blending, so it tells surfaces and their directions apart for the smoothing of outlines
+    colour.a = fract(0.381966 * float(vIds.y) + dot(normal, vec3(0.13, 0.17, 0.2)));
+#endif
+    return colour;
+}
+#endif
+
 void main() {
     vec3 toEye = isPerspective() ? normalize(-vEye) : vec3(0.0, 0.0, 1.0);
 #ifdef ANALYTIC
@@ -210,24 +240,15 @@ void main() {
 #endif
     if (dot(normal, toEye) < 0.0) normal = -normal;  // meshes of others are not always closed
 #ifdef PASS_RGB
-#ifdef TEXTURED
-    vec4 texel = texture(uTexture, vTexCoord);
-#else
-    vec4 texel = vec4(1.0);
+    fColour = colourOf(eye, normal, toEye);
 #endif
-#ifdef MARKS
-    texel.rgb *= marked(eye);
+#ifdef PASS_PLACES
+    fPlaces = vec4(-1.0);  // in the first two shadow maps; outside of them all is lit
+#ifdef SHADOWS
+    if (vShadow[0].w > 0.0) fPlaces.xy = vShadow[0].xy / vShadow[0].w;
+#if SHADOWS > 1
+    if (vShadow[1].w > 0.0) fPlaces.zw = vShadow[1].xy / vShadow[1].w;
 #endif
-#ifdef PHYSICAL
-    fColour.rgb = physical(uDiffuse * texel.rgb, eye, shadedNormal(normal), toEye);
-#else
-    fColour.rgb = phong(texel.rgb, eye, shadedNormal(normal), toEye);
-#endif
-#ifdef CLEAR
-    fColour.a = uAlpha * texel.a;
-#else
-    // not needed for blending, so it tells surfaces and their directions apart for the smoothing of outlines
-    fColour.a = fract(0.381966 * float(vIds.y) + dot(normal, vec3(0.13, 0.17, 0.2)));
 #endif
 #endif
 #ifdef PASS_DEPTH
