@@ -23,7 +23,7 @@ INSTANCE = np.dtype([("model_view", "f4", (4, 4)), ("ids", "i4", 2)])
 _VERTEX = (("aPosition", 3), ("aNormal", 3), ("aTexCoord", 2), ("aTangent", 4))
 
 
-PATIENCE = 300
+STILL_AFTER = 300
 """Moments that something has to stay where it is, down to the last bit, before it stands still."""
 
 
@@ -137,12 +137,12 @@ class Instances:
         self.ids = np.array([(piece.owner + 1, index + 1) for index, piece in enumerate(pieces)], dtype="i4")
         self.ids = self.ids.reshape(-1, 2)  # a scene may have nothing to see
         self.T_world_piece = np.full((len(pieces), 4, 4), np.nan)
-        self._stayed = np.full(len(pieces), PATIENCE)  # what has never moved stands still
+        self._stayed = np.full(len(pieces), STILL_AFTER)  # what has never moved stands still
 
     @property
     def still(self) -> NDArray[np.bool_]:
         """Which instances stand still."""
-        return self._stayed > PATIENCE
+        return self._stayed > STILL_AFTER
 
     def place(self, T_world_owner: Array) -> None:
         """Move everything along with its owners (n, 4, 4)."""
