@@ -84,7 +84,7 @@ SLACK, EVEN, LOOSE = 0.05, 0.8, 15
 """Newtons below which an end is slack; share of the other end's tension above which a hand eases its own; actions by
 which both hands go on once both ends are slack."""
 
-TIMES, MOST = 6, 300
+TIMES, MOST = 8, 300
 """How often the knot is slid and locked at most, and actions of a slide, of a lock and of easing at most."""
 
 DISPLACED = np.array([-0.0015, 0.0010, 0.0])
@@ -137,7 +137,7 @@ class Sewn(Ligating):
 class Knotting(Knotter):
     """Both hands, and the thread, over soft tissue: that bends the free end, so they look where it is."""
 
-    UP, LOCKED, TIGHT = np.array([-0.031, 0.047, 0.039]), 6.0, 0.1
+    UP, LOCKED, TIGHT = np.array([-0.031, 0.047, 0.039]), 10.0, 0.1
 
     def bring(self) -> Iterator[Array]:
         """As ever, then the right hand turns about its tool until the free end runs where the left one can take it."""
