@@ -143,10 +143,12 @@ demo: setup
 film: setup
 	.venv/bin/ligature demo --out build/film
 	.venv/bin/ligature demo --tissue --out build/film/tissue
+	.venv/bin/ligature demo --knot --out build/film/knot
 	.venv/bin/ligature render scenes/peg_transfer/launch.yaml --camera cameraL --width 480 --height 300 --out build/film/peg_transfer
 	.venv/bin/ligature render scenes/needle_pick/launch.yaml --camera cameraL --width 480 --height 300 --out build/film/needle_pick
 	cp build/film/suture.webp docs/pictures/suture.webp
 	cp build/film/tissue/suture.webp docs/pictures/suture_tissue.webp
+	cp build/film/knot/suture.webp docs/pictures/close_wound.webp
 	cp build/film/suture_7.png docs/pictures/suturing.png
 	cp build/film/peg_transfer/cameraL.png docs/pictures/peg_transfer.png
 	cp build/film/needle_pick/cameraL.png docs/pictures/needle_pick.png

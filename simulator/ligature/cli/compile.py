@@ -39,6 +39,9 @@ One begins with threads; the other with bodies and tissue, so that it need not w
 TICKS = 300
 """Ticks that each scene runs, of which arms find their home for the last part."""
 
+PICTURES = 3
+"""Of the first one nothing is kept, the second keeps what stands still, the third begins with it."""
+
 BEFORE, BEYOND, SPEED = 0.005, 0.01, 0.05
 """Metres of a needle's circle before the entry at which its tip begins, and of thread that goes in; metres a second."""
 
@@ -136,12 +139,14 @@ def _pierce(simulation: ligature.Simulation, needle: Needle, throw: Throw) -> No
 
 
 def _draw(simulation: ligature.Simulation) -> None:
-    """A picture of the first camera, where there is one and OpenGL."""
+    """Pictures of the first camera, where there is one and OpenGL, until they begin with what stands still."""
     from ligature.render.context import RenderUnavailable
 
     for camera in list(simulation.cameras)[:1]:
         try:
-            simulation.cameras[camera].capture()
+            for _ in range(PICTURES):
+                simulation.cameras[camera].capture()
+                simulation.step(TICKS)
         except RenderUnavailable:
             return
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import ligature
 from ligature.datasets.interrupts import interrupted_once
 from ligature.datasets.labels import ACTIVITIES, MOVING, MarkedPhases
-from ligature.datasets.rows import EpisodeRows, add_actions
+from ligature.datasets.rows import EpisodeRows, Packed, add_actions
 from ligature.datasets.store import DatasetError, EpisodeStore, unwritable
 from ligature.datasets.writer import FORMAT, JOINT_ROWS, POSE, WRENCH
 from ligature.ros.bags import BagError
@@ -163,7 +163,7 @@ def _write_pictures(
     for name, topic in topics.items():
         K = intrinsics(bag, topic, size)
         for picture in pictures(bag, topic, stamps.tolist(), size):
-            rows.append(f"cameras/{name}/rgb", picture, "u1", picture=True)
+            rows.append_picture(f"cameras/{name}/rgb", Packed.of(picture, "u1"))
             store.check()
             if K is not None:
                 rows.append(f"cameras/{name}/intrinsics", K, "f8", units="px")

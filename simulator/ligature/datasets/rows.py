@@ -6,7 +6,7 @@ the same to readers.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -17,10 +17,25 @@ GATHERED = 256
 """Rows of a chunk, and so rows that wait for their chunk to be full."""
 
 PICTURE = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-"""How HDF5 is to unpack a picture; `packed` packs it so."""
+"""How HDF5 is to unpack a picture; `Packed` holds it so."""
 
 EFFORT = 2
 """Level of ISA-L's deflate: a fifth of the time of zlib's first level, 4 % larger."""
+
+
+class Packed(NamedTuple):
+    """A picture as HDF5's filters leave it; making one takes milliseconds, and no file."""
+
+    shape: tuple[int, ...]
+    dtype: str
+    content: bytes
+
+    @classmethod
+    def of(cls, picture: Any, dtype: str) -> Packed:
+        """A ``picture`` with numbers of another type: first bytes of all numbers, then the second ones; deflated."""
+        array = np.ascontiguousarray(picture, dtype=dtype)
+        planes = np.ascontiguousarray(array.reshape(-1).view(np.uint8).reshape(-1, array.itemsize).T)
+        return cls(array.shape, dtype, bytes(isal_zlib.compress(planes, EFFORT)))
 
 
 class EpisodeRows:
@@ -31,25 +46,33 @@ class EpisodeRows:
         self._arrays: dict[str, h5py.Dataset] = {}
         self._waiting: dict[str, list[NDArray[Any]]] = {}
 
-    def append(self, name: str, value: Any, dtype: str, picture: bool = False, **notes: str) -> None:
+    def append(self, name: str, value: Any, dtype: str, **notes: str) -> None:
         """Add a row to the array ``name``; ``notes`` such as ``units`` are its attributes."""
-        row = np.asarray(value).astype(dtype, copy=not picture)  # a row that waits must not change with the simulation
-        array = self._arrays.get(name)
-        if array is None:
-            array = self._arrays[name] = self._file.create_dataset(
-                name, (0, *row.shape), dtype, maxshape=(None, *row.shape),
-                chunks=(1 if picture else GATHERED, *row.shape), **(PICTURE if picture else {}),
-            )  # fmt: skip
-            array.attrs.update(notes)
-        if picture:
-            at = len(array)
-            array.resize(at + 1, axis=0)
-            array.id.write_direct_chunk((at, *[0] * row.ndim), packed(row))
-            return
+        row = np.asarray(value).astype(dtype)  # a copy: a row that waits must not change with the simulation
+        if name not in self._arrays:
+            self._create(name, row.shape, dtype, GATHERED, {}, notes)
         waiting = self._waiting.setdefault(name, [])
         waiting.append(row)
         if len(waiting) == GATHERED:
             self._write(name)
+
+    def append_picture(self, name: str, picture: Packed, **notes: str) -> None:
+        """Add a picture to the array ``name``."""
+        if name not in self._arrays:
+            self._create(name, picture.shape, picture.dtype, 1, PICTURE, notes)
+        array = self._arrays[name]
+        at = len(array)
+        array.resize(at + 1, axis=0)
+        array.id.write_direct_chunk((at, *[0] * len(picture.shape)), picture.content)
+
+    def _create(
+        self, name: str, shape: tuple[int, ...], dtype: str, chunk: int, options: dict[str, Any], notes: dict[str, str]
+    ) -> None:
+        """Create the array ``name``, of chunks of so many rows."""
+        self._arrays[name] = array = self._file.create_dataset(
+            name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(chunk, *shape), **options
+        )
+        array.attrs.update(notes)
 
     def _write(self, name: str) -> None:
         array, rows = self._arrays[name], self._waiting.pop(name)
@@ -75,10 +98,3 @@ def add_actions(episode: h5py.File) -> None:
 
 def _add_next(arm: h5py.Group, name: str, values: NDArray[Any], units: str) -> None:
     arm.create_dataset(name, data=np.concatenate([values[1:], values[-1:]])).attrs["units"] = units
-
-
-def packed(picture: NDArray[Any]) -> bytes:
-    """``picture`` as HDF5's filters leave it: first bytes of all numbers, then the second ones; deflated."""
-    flat = np.ascontiguousarray(picture).reshape(-1).view(np.uint8)
-    planes = flat.reshape(-1, picture.itemsize).T
-    return bytes(isal_zlib.compress(np.ascontiguousarray(planes), EFFORT))

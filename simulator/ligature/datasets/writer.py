@@ -7,6 +7,7 @@ that has ended is on the disk (`ligature.datasets.store`), whatever interrupts t
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -20,7 +21,7 @@ import ligature
 from ligature.camera_simulation import Simulation
 from ligature.datasets.events import ARM_EVENTS, NEEDLE_EVENTS, EventWatch
 from ligature.datasets.labels import ACTIVITIES, GESTURES, MOST_PHASES, ActivityWatch
-from ligature.datasets.rows import EpisodeRows, add_actions
+from ligature.datasets.rows import EpisodeRows, Packed, add_actions
 from ligature.datasets.store import EpisodeStore, unwritable
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
 from ligature.model.soft import TissueBody
@@ -50,6 +51,9 @@ Array = NDArray[np.float64]
 
 Value = tuple[str, Any, dict[str, Any]]
 """Name and value of what one sample has, and how `EpisodeRows.append` keeps it."""
+
+Picture = tuple[str, Packed, dict[str, str]]
+"""Name of an array, its next picture, and the array's attributes."""
 
 
 class DatasetWriter:
@@ -108,6 +112,8 @@ class DatasetWriter:
         self._episode: h5py.File | None = None
         self._rows: EpisodeRows | None = None
         self._exposures: dict[str, Exposure] = {}
+        self._developed: Future[list[Picture]] | None = None
+        self._laboratory = ThreadPoolExecutor(1, "pictures")
         self._shapes: dict[str, tuple[int, ...]] = {}
         self._samples, self._due, self._ended = 0, 0.0, False
         try:
@@ -166,7 +172,8 @@ class DatasetWriter:
                 self._begin(time)
             self._shapes = {name: value.shape for name, value in extras.items()}
             assert self._rows is not None
-            self._append_pictures(self._exposed())
+            self._append_pictures()
+            self._expose()
             for name, value, options in self._values(phase, arms):
                 self._rows.append(name, value, **options)
             for name, value in extras.items():
@@ -195,7 +202,7 @@ class DatasetWriter:
 
     def _begin(self, time: float) -> None:
         self._episode = self._store.begin()
-        self._rows, self._exposures = EpisodeRows(self._episode), {}
+        self._rows, self._exposures, self._developed = EpisodeRows(self._episode), {}, None
         self._samples, self._due = 0, time
         self._events.begin()
 
@@ -210,8 +217,9 @@ class DatasetWriter:
         _check_texts(remarks)
         with self._writing():
             assert self._rows is not None
-            self._append_pictures(self._exposures)
-            self._exposures = {}
+            self._append_pictures()
+            self._develop()
+            self._append_pictures()
             self._rows.finish()
             attributes = self._episode.attrs
             attributes["success"], attributes["samples"], attributes["task"] = success, self._samples, self._task
@@ -227,7 +235,7 @@ class DatasetWriter:
         self._store.drop()
 
     def _forget(self) -> None:
-        self._episode, self._rows, self._exposures = None, None, {}
+        self._episode, self._rows, self._exposures, self._developed = None, None, {}, None
 
     def _values(self, phase: str, doers: Collection[str] | None) -> Iterator[Value]:
         """The values of one sample."""
@@ -280,26 +288,26 @@ class DatasetWriter:
         wrench = {"dtype": "f4", "units": "N, N m", "axes": WRENCH}
         yield f"arms/{arm.name}/spatial_measured_cf", record["spatial_measured_cf"], wrench
 
-    def _exposed(self) -> dict[str, Exposure]:
-        """Begin the pictures of this sample; returns those of the last one, which were drawn since then.
+    def _expose(self) -> None:
+        """Begin the pictures of this sample; those of the last one were drawn since then, and are developed now."""
+        self._develop()
+        self._exposures = {name: camera.expose(self._size) for name, camera in self._cameras.items()}
 
-        The last ones are developed and packed while the new ones are drawn.
-        """
+    def _develop(self) -> None:
+        """Have the pictures that are drawn developed and packed in another thread, beside what comes next."""
         for exposure in self._exposures.values():
-            exposure.fetch()
-        begun = {name: camera.expose(self._size) for name, camera in self._cameras.items()}
-        drawn, self._exposures = self._exposures, begun
-        return drawn
+            exposure.fetch()  # needs the thread of OpenGL
+        if self._exposures:
+            self._developed = self._laboratory.submit(_developed, self._exposures)
+            self._exposures = {}
 
-    def _append_pictures(self, exposures: Mapping[str, Exposure]) -> None:
-        assert self._rows is not None
-        for name, exposure in exposures.items():
-            picture = exposure.frame()
-            steps = np.where(np.isfinite(picture.depth), picture.depth / DEPTH_UNIT, 0.0)
-            depth = np.minimum(steps.round(), 65535.0)
-            self._rows.append(f"cameras/{name}/rgb", picture.rgb, "u1", picture=True)
-            self._rows.append(f"cameras/{name}/depth", depth, "u2", picture=True, units="depth_unit")
-            self._rows.append(f"cameras/{name}/ids", picture.ids, "u2", picture=True)
+    def _append_pictures(self) -> None:
+        """Add the pictures that have been developed."""
+        if self._developed is not None:
+            assert self._rows is not None
+            for name, picture, notes in self._developed.result():
+                self._rows.append_picture(name, picture, **notes)
+            self._developed = None
 
     # --- the end ----------------------------------------------------------------------------
 
@@ -314,6 +322,7 @@ class DatasetWriter:
         with self._writing():
             self._store.close(empty=True)
         self._ended = True
+        self._laboratory.shutdown()
 
     def abandon(self) -> None:
         """End the dataset without the unfinished episode; without any other, delete it."""
@@ -321,6 +330,7 @@ class DatasetWriter:
             self._ended = True
             self._forget()
             self._store.close(empty=False)
+            self._laboratory.shutdown()
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -351,6 +361,19 @@ class DatasetWriter:
             self.close()
         else:
             self.abandon()
+
+
+def _developed(exposures: Mapping[str, Exposure]) -> list[Picture]:
+    """The pictures of one sample."""
+    found: list[Picture] = []
+    for name, exposure in exposures.items():
+        frame = exposure.frame()
+        steps = np.where(np.isfinite(frame.depth), frame.depth / DEPTH_UNIT, 0.0)
+        depth = np.minimum(steps.round(), 65535.0)
+        found.append((f"cameras/{name}/rgb", Packed.of(frame.rgb, "u1"), {}))
+        found.append((f"cameras/{name}/depth", Packed.of(depth, "u2"), {"units": "depth_unit"}))
+        found.append((f"cameras/{name}/ids", Packed.of(frame.ids, "u2"), {}))
+    return found
 
 
 def _check_texts(remarks: Mapping[str, Any]) -> None:

@@ -107,7 +107,7 @@ class Keeper:
         cells = tuple(
             cells_of(read[..., 2 * k : 2 * k + 2], shadow.size) for k, shadow in enumerate(self._lights.shadow_views)
         )
-        kept = Kept(keepable, blank.contents(), blank.depths(), cells)
+        kept = Kept(keepable, blank.contents(), blank.depths().copy(), cells)  # `chosen` takes what can be written
         _add(self._kept, key, kept, slots)
         return kept
 
