@@ -25,7 +25,7 @@ from ligature.tasks.throws import PAD, UP, Throw, drawn_back
 from ligature.tasks.wounds import ClosureScore
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from soft_knot import Outcome, Sewn, Theatre, judged, scattered, tie  # noqa: E402
+from soft_knot import Outcome, Sewn, Theatre, judged, make_knot, scattered  # noqa: E402
 from suture import ABOVE, BEFORE, BEYOND, HOLD_DEPTHS, OPEN, SHUT, STREAM, Failure, Film  # noqa: E402
 from suture_tissue import Plan, TissueSurgeon  # noqa: E402
 
@@ -226,7 +226,7 @@ def operate(simulation: ligature.Simulation, seed: int = 0, watch: Callable[[], 
         goal = Stitched(simulation, tuple(closer.arms.values()))
         closer.offer(goal)
         theatre = Theatre(simulation, goal, closer.see)
-        outcome = judged(theatre, *tie(theatre))
+        outcome = judged(theatre, *make_knot(theatre))
     except (Failure, ValueError) as failure:
         stopped = str(failure)
     return Closed(closer.score(), outcome, stopped)

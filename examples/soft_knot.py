@@ -333,7 +333,7 @@ def begun(simulation: ligature.Simulation, seed: int) -> Sewn:
     return goal
 
 
-def tie(theatre: Theatre) -> tuple[list[float], str]:
+def make_knot(theatre: Theatre) -> tuple[list[float], str]:
     """Make the knot, let go, wait; returns the gaps of `Outcome`, and why it stopped, if it did."""
     env: Any = theatre
     knotter, goal, stopped = Knotting(Hand(env, 0)), theatre.goal, ""
@@ -368,7 +368,7 @@ def operate(simulation: ligature.Simulation, seed: int = 0, watch: Callable[[], 
         theatre = Theatre(simulation, begun(simulation, seed), watch)
     except ValueError as error:  # the jaws do not hold the thread
         raise Failure(str(error)) from error
-    return judged(theatre, *tie(theatre))
+    return judged(theatre, *make_knot(theatre))
 
 
 def main() -> int:

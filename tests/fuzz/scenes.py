@@ -381,6 +381,8 @@ class _Author:
         block |= rng.choice(({"diameter": 0.0003}, {"USP size": "2-0"}, {"diameter": 0.002}))
         if rng.random() < 0.5:
             block["parent"] = rng.choice([b.key for b in self.bodies])
+            if rng.random() < 0.5:
+                block["release force"] = rng.choice((0.0, 1e-3, 1.0, 1e6))
         else:
             block["location"] = _pose((APART * 12, 0.0, 1.0), _vector(rng, 3.0))
         self._enter(model, "sutures", "SUTURE thread", block)
