@@ -237,7 +237,8 @@ def test_who_can_write_nowhere_gets_a_private_folder_and_one_line(program: str, 
     assert done.returncode == 0, done.stderr
     folder = tmp_path / "temporary" / f"ligature-{os.getuid()}"
     assert done.stdout.startswith(f"42 {folder}/kernels/")
-    assert len(done.stderr.splitlines()) == 1
+    warnings = [line for line in done.stderr.splitlines() if not line.startswith("compiling for this machine")]
+    assert len(warnings) == 1  # a busy machine compiles for a second, and reports it
     assert f"cannot be written (Not a directory): {folder} is used; set LIGATURE_CACHE" in done.stderr
     assert folder.stat().st_mode & 0o777 == 0o700 and list(folder.rglob("*.nbc"))
     again = run(program, **wishes, TMPDIR=str(tmp_path / "temporary"))

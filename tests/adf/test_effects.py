@@ -155,6 +155,7 @@ CONTEXTS: dict[tuple[str, str], dict[str, Any]] = {
     ("sensor", "mesh"): {"array": None}, ("sensor", "distance threshold"): {"type": "Contact"},
     ("sensor", "process contact details"): {"type": "Contact"},
     ("camera", "orthographic view width"): {}, ("suture", "USP size"): {"diameter": None},
+    ("suture", "release force"): {"parent": "BODY base"},
     ("light", "location.orientation"): {"direction": None, "location": dict(AT)},
     ("camera", "field view angle"): {},
 }  # fmt: skip

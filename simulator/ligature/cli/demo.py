@@ -46,7 +46,7 @@ def demo(
     soft = "--knot" if knot else "--tissue" if tissue else ""
     example = EXAMPLE.with_name("close_wound.py" if knot else "suture_tissue.py") if soft else EXAMPLE
     if soft and dataset is not None:
-        console.print(f"--dataset writes sutures through holes; leave out {soft}, or --dataset")
+        console.print(f"--dataset writes sutures through holes; leave out {soft}, or --dataset", markup=False)
         return 2
     if not example.is_file():
         console.print(f"the demonstration '{example}' is missing; install Ligature again", markup=False)
