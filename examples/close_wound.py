@@ -9,7 +9,6 @@ metres, radians, newtons, seconds of simulated time.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Callable
@@ -26,7 +25,7 @@ from ligature.tasks.wounds import ClosureScore
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from soft_knot import Outcome, Sewn, Theatre, judged, make_knot, scattered  # noqa: E402
-from suture import ABOVE, BEFORE, BEYOND, HOLD_DEPTHS, OPEN, SHUT, STREAM, Failure, Film  # noqa: E402
+from suture import ABOVE, OPEN, SHUT, STREAM, Failure, Film, seed_and_folder  # noqa: E402
 from suture_tissue import Plan, TissueSurgeon  # noqa: E402
 
 Array = np.ndarray
@@ -88,12 +87,6 @@ class Closer(TissueSurgeon):
         near, far = super().ends(pair)
         return far, near
 
-    def see(self) -> None:
-        """Look at what happens while something else advances the simulation."""
-        self.monitor.observe(self._state)
-        self.force = max(self.force, float(self._state["tissue_peak"][self.wound.tissue.index]))
-        self._watch()
-
     # --- the stitch ---------------------------------------------------------------------------
 
     def stitch(self) -> None:
@@ -109,8 +102,7 @@ class Closer(TissueSurgeon):
 
     def take_needle(self, name: str, throw: Throw) -> None:
         """Take the needle from the board as it is driven, and lift it."""
-        way = [throw.arc_at(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
-        self.take(name, self._grasp(name, HOLD_DEPTHS, way, self.needle()))
+        self.take_to_drive(name, throw)
         self.line(name, frame(np.eye(3), LIFTED * UP) @ self.tool(name))
 
     def draw_through(self, name: str) -> None:
@@ -234,12 +226,10 @@ def operate(simulation: ligature.Simulation, seed: int = 0, watch: Callable[[], 
 
 def main() -> int:
     """Close a wound and print how well it went."""
-    arguments = argparse.ArgumentParser(description="Two arms close a wound in soft tissue by a stitch and a knot.")
-    arguments.add_argument("--seed", type=int, default=0, help="hands, friction and stiffness; 0 is the scene's own")
-    arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
-    given = arguments.parse_args()
-    if given.seed < 0:
-        arguments.error("--seed is at least 0")
+    given = seed_and_folder(
+        "Two arms close a wound in soft tissue by a stitch and a knot.",
+        "hands, friction and stiffness; 0 is the scene's own",
+    )
     simulation = ligature.Simulation(scattered(ligature.load(SCENE), given.seed))
     film = Film(simulation, given.out) if given.out else None
     started = time.perf_counter()

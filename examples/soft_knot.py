@@ -11,7 +11,6 @@ time.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -35,7 +34,7 @@ from ligature.tasks.knots import SQUARE_KNOT, extended
 from ligature.tasks.wounds import CLOSED, Wound
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from suture import Failure, Film  # noqa: E402
+from suture import Failure, Film, seed_and_folder  # noqa: E402
 
 Array = np.ndarray
 
@@ -373,12 +372,10 @@ def operate(simulation: ligature.Simulation, seed: int = 0, watch: Callable[[], 
 
 def main() -> int:
     """Make a knot and print how well it went."""
-    arguments = argparse.ArgumentParser(description="Two arms make a square knot over a wound in soft tissue.")
-    arguments.add_argument("--seed", type=int, default=0, help="hands, friction and stiffness; 0 is the scene's own")
-    arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
-    given = arguments.parse_args()
-    if given.seed < 0:
-        arguments.error("--seed is at least 0")
+    given = seed_and_folder(
+        "Two arms make a square knot over a wound in soft tissue.",
+        "hands, friction and stiffness; 0 is the scene's own",
+    )
     simulation = ligature.Simulation(scattered(ligature.load(SCENE), given.seed))
     film = Film(simulation, given.out) if given.out else None
     try:

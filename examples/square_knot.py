@@ -9,7 +9,6 @@ first one. The program localises from ground truth and moves the arms by CRTK al
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -25,7 +24,7 @@ from ligature.tasks.throws import drawn_back
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from looping import ASIDE, BEGIN, END, SHARES, THINNEST, between, drawn, radius_for  # noqa: E402
-from suture import Failure, Film  # noqa: E402
+from suture import Failure, Film, seed_and_folder  # noqa: E402
 from two_arms import (  # noqa: E402
     BRISK,
     CAREFUL,
@@ -416,12 +415,10 @@ def operate(simulation: ligature.Simulation, watch: Callable[[], object] = lambd
 
 def main() -> int:
     """Make a knot and print how well it went."""
-    arguments = argparse.ArgumentParser(description="Two arms make a square knot around a vessel by themselves.")
-    arguments.add_argument("--seed", type=int, default=0, help="where the thread lies; 0 is the scene's own place")
-    arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
-    given = arguments.parse_args()
-    if given.seed < 0:
-        arguments.error("--seed is at least 0")
+    given = seed_and_folder(
+        "Two arms make a square knot around a vessel by themselves.",
+        "where the thread lies; 0 is the scene's own place",
+    )
     simulation = ligature.Simulation(scattered(ligature.load(SCENE), given.seed))
     film = Film(simulation, given.out) if given.out else None
     score, stopped = operate(simulation, film.watch if film else lambda: None)

@@ -87,8 +87,12 @@ class Surgeon:
         """Advance the simulation, and look at it all the while."""
         for _ in range(max(1, round(seconds / STREAM))):
             self.simulation.step(round(STREAM / self.simulation.dt))
-            self.monitor.observe(self.simulation.state[0])
-            self._watch()
+            self.see()
+
+    def see(self) -> None:
+        """Look at the simulation, which this or something else has advanced."""
+        self.monitor.observe(self.simulation.state[0])
+        self._watch()
 
     def needle(self) -> Array:
         """Pose (4, 4) of the needle's arc frame."""
@@ -249,9 +253,13 @@ class Surgeon:
 
     def hand_over(self, giver: str, taker: str, throw: Throw) -> None:
         """The needle goes to the arm that drives the next throw."""
-        way = [throw.arc_at(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
-        self.take(taker, self._grasp(taker, HOLD_DEPTHS, way, self.needle()))
+        self.take_to_drive(taker, throw)
         self.leave(giver)
+
+    def take_to_drive(self, name: str, throw: Throw) -> None:
+        """Take the needle where it is, as it is held to be driven all the way."""
+        way = [throw.arc_at(a, self.arc) for a in np.linspace(-BEFORE, throw.towards_exit + BEYOND, 12)]
+        self.take(name, self._grasp(name, HOLD_DEPTHS, way, self.needle()))
 
     def suture(self, pairs: tuple[int, ...], driver: str = "PSM2", puller: str = "PSM1") -> None:
         """Throws through ``pairs``, from picking the needle up to pulling it out of the last hole."""
@@ -361,6 +369,17 @@ def perform(
     if film is not None:
         print(film.save())
     return 0 if score.success and not stopped else 1
+
+
+def seed_and_folder(description: str, seed: str) -> argparse.Namespace:
+    """The options ``--seed``, which is for what ``seed`` names, and ``--out`` of a program that has no others."""
+    arguments = argparse.ArgumentParser(description=description)
+    arguments.add_argument("--seed", type=int, default=0, help=seed)
+    arguments.add_argument("--out", type=Path, help="folder for pictures and an animation")
+    given = arguments.parse_args()
+    if given.seed < 0:
+        arguments.error("--seed is at least 0")
+    return given
 
 
 def main() -> int:

@@ -120,11 +120,10 @@ class TissueSurgeon(Surgeon):
     def _state(self) -> Any:
         return self.simulation.state[0]
 
-    def wait(self, seconds: float) -> None:
-        """Advance the simulation, and keep the largest force on the tissue."""
-        for _ in range(max(1, round(seconds / STREAM))):
-            super().wait(STREAM)
-            self.force = max(self.force, float(self._state["tissue_peak"][self.wound.tissue.index]))
+    def see(self) -> None:
+        """Look at the simulation, and keep the largest force on the tissue."""
+        super().see()
+        self.force = max(self.force, float(self._state["tissue_peak"][self.wound.tissue.index]))
 
     def ends(self, pair: int) -> tuple[Array, Array]:
         """Where a stitch goes in and out, (3,) each."""

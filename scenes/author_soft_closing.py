@@ -69,23 +69,12 @@ def way(width: float, heading: float) -> np.ndarray:
 
 def needle(start: np.ndarray, heading: float) -> tuple[dict[str, Any], np.ndarray, np.ndarray]:
     """The needle, its pose (4, 4), and in its frame that of the start of its thread, over ``start`` from `PLACE`."""
-    shapes, centre, mass = small.arc_shapes()
-    tail = small.NEEDLE_RADIUS * np.array([np.cos(small.NEEDLE_START), np.sin(small.NEEDLE_START), 0.0])
-    T_needle_tail = pose_matrix(tuple(tail), (small.HALF_PI, 0, small.NEEDLE_START - np.pi))
+    T_needle_tail = small.needle_tail()
     T = pose_matrix((0, 0, 0), (0, 0, heading - np.pi / 2 - small.NEEDLE_START))
     start = np.array(knot.PLACE) + start
     start[2] = knot.PLACE[2] + BOARD_HIGH[2] + REST[2] + small.NEEDLE_THICKNESS + 0.0002
-    T[:3, 3] = start - T[:3, :3] @ tail
-    block = small.body(
-        "Needle", T, small.number(mass), shapes,
-        **{
-            "inertial offset": small.pose(pose_matrix(tuple(centre), (0, 0, 0))),
-            "damping": {"linear": 0.1, "angular": 0.1},
-        },
-    )  # fmt: skip
-    del block["compound shape"]
-    block["mesh"] = "needle.obj"
-    return block, T, T_needle_tail
+    T[:3, 3] = start - T[:3, :3] @ T_needle_tail[:3, 3]
+    return small.needle(T), T, T_needle_tail
 
 
 def board(T_needle: np.ndarray) -> dict[str, Any]:

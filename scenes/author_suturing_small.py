@@ -321,6 +321,26 @@ def arc_shapes() -> tuple[list[dict[str, Any]], np.ndarray, float]:
     return shapes, np.average(centres, axis=0, weights=lengths), mass
 
 
+def needle_tail() -> np.ndarray:
+    """Pose (4, 4) of the start of its thread in the needle's frame."""
+    tail = NEEDLE_RADIUS * np.array([np.cos(NEEDLE_START), np.sin(NEEDLE_START), 0.0])
+    return pose_matrix(tuple(tail), (HALF_PI, 0, NEEDLE_START - np.pi))
+
+
+def needle(T_world_needle: np.ndarray) -> dict[str, Any]:
+    """The needle, there."""
+    shapes, centre, mass = arc_shapes()
+    block = body(
+        "Needle", T_world_needle, number(mass), shapes,
+        **{
+            "inertial offset": pose(pose_matrix(tuple(centre), (0, 0, 0))),
+            "damping": {"linear": 0.1, "angular": 0.1},
+        },
+    )  # fmt: skip
+    looks(block, "needle.obj")
+    return block
+
+
 def phantom(elements: int | None = None) -> dict[str, Any]:
     """The block, the needle, a thread of ``elements`` (`THREAD_ELEMENTS`), and the frame that carries the cameras."""
     top = 0.715
@@ -330,24 +350,14 @@ def phantom(elements: int | None = None) -> dict[str, Any]:
     T_world_camera = pose_matrix((0.0307, 0.25102, 0.81025), (0.69813, 0, -3.14158))
     bodies["BODY CameraFrame"] = body("CameraFrame", T_world_camera, 0.0, [])
 
-    shapes, centre, mass = arc_shapes()
+    looks(bodies["BODY Block"], "block.obj")  # of author_looks.py, as the needle's
     T_world_needle = pose_matrix((0.005, 0.2, top + NEEDLE_THICKNESS + 0.0002), (0, 0, 0))
-    bodies["BODY Needle"] = body(
-        "Needle", T_world_needle, number(mass), shapes,
-        **{
-            "inertial offset": pose(pose_matrix(tuple(centre), (0, 0, 0))),
-            "damping": {"linear": 0.1, "angular": 0.1},
-        },
-    )  # fmt: skip
-    for name, mesh in (("Block", "block.obj"), ("Needle", "needle.obj")):  # looks: author_looks.py
-        del bodies[f"BODY {name}"]["compound shape"]
-        bodies[f"BODY {name}"]["mesh"] = mesh
+    bodies["BODY Needle"] = needle(T_world_needle)
 
     length = THREAD_LENGTH / THREAD_ELEMENTS
     area = np.pi * THREAD_RADIUS**2
     bending = THREAD_MODULUS * np.pi * THREAD_RADIUS**4 / 4 / length
-    tail = NEEDLE_RADIUS * np.array([np.cos(NEEDLE_START), np.sin(NEEDLE_START), 0.0])
-    T_needle_tail = pose_matrix(tuple(tail), (HALF_PI, 0, NEEDLE_START - np.pi))
+    T_needle_tail = needle_tail()
     joints: dict[str, Any] = {}
     names = ["Thread"] + [f"Thread_{i:03d}" for i in range(1, elements or THREAD_ELEMENTS)]
     mass_element = THREAD_DENSITY * area * length

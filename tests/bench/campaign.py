@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import ligature
+
 Row = dict[str, Any]
 """What is kept of one seed."""
 
@@ -24,6 +26,13 @@ def keep(file: Path, row: Row) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("a", encoding="utf-8") as kept:
         kept.write(json.dumps(row) + "\n")
+
+
+def authored(texts: dict[str, str], folder: Path, scenes: Path) -> ligature.Scene:
+    """The scene of an authoring script's ``texts``, written to ``folder`` beside which its neighbours in ``scenes`` lie."""
+    for name, text in texts.items():
+        (folder / name).write_text(text.replace(" ../", f" {scenes}/"), encoding="utf-8")
+    return ligature.load(folder / "launch.yaml", roots=[scenes])
 
 
 def arguments(description: str) -> argparse.ArgumentParser:

@@ -20,7 +20,7 @@ from pathlib import Path
 import ligature
 import numpy as np
 
-from tests.bench.campaign import Row, arguments, go_on
+from tests.bench.campaign import Row, arguments, authored, go_on
 from tests.bench.tissue_seeds import drawn
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,10 +39,8 @@ def scene_of(seed: int, folder: Path) -> ligature.Scene:
         return ligature.load(close_wound.SCENE)
     width, youngs = drawn(seed)
     heading = author_soft_closing.HEADING + float(np.random.default_rng([seed, 16]).uniform(-TURNED, TURNED))
-    scenes = close_wound.SCENE.parents[1]
-    for name, text in author_soft_closing.texts(round(width, 5), round(youngs), round(heading, 4)).items():
-        (folder / name).write_text(text.replace(" ../", f" {scenes}/"), encoding="utf-8")
-    return scattered(ligature.load(folder / "launch.yaml", roots=[scenes]), seed)
+    texts = author_soft_closing.texts(round(width, 5), round(youngs), round(heading, 4))
+    return scattered(authored(texts, folder, close_wound.SCENE.parents[1]), seed)
 
 
 def attempt(seed: int) -> Row:

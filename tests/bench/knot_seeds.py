@@ -18,7 +18,7 @@ from pathlib import Path
 
 import ligature
 
-from tests.bench.campaign import Row, arguments, go_on
+from tests.bench.campaign import Row, arguments, authored, go_on
 from tests.bench.tissue_seeds import drawn
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,9 +32,8 @@ def scene_of(seed: int, folder: Path) -> ligature.Scene:
     if seed == 0:
         return ligature.load(soft_knot.SCENE)
     width, youngs = drawn(seed)
-    for name, text in author_soft_knot.texts(round(width, 5), round(youngs)).items():
-        (folder / name).write_text(text.replace(" ../", f" {soft_knot.SCENE.parents[1]}/"), encoding="utf-8")
-    return soft_knot.scattered(ligature.load(folder / "launch.yaml", roots=[soft_knot.SCENE.parents[1]]), seed)
+    texts = author_soft_knot.texts(round(width, 5), round(youngs))
+    return soft_knot.scattered(authored(texts, folder, soft_knot.SCENE.parents[1]), seed)
 
 
 def attempt(seed: int) -> Row:

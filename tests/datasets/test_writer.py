@@ -312,7 +312,6 @@ FULL = """
 import resource, sys
 import ligature
 from pathlib import Path
-from typing import Any
 from ligature.datasets import DatasetError, DatasetWriter
 simulation = ligature.Simulation(ligature.load({scene!r}))
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))

@@ -13,6 +13,8 @@ from ligature.tasks import throws
 from ligature.tasks.knots import SQUARE_KNOT
 from ligature.tasks.wounds import ClosureScore, Stitch
 
+from tests.bench.campaign import authored
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "examples"), str(ROOT / "scenes")]
 
@@ -29,11 +31,8 @@ STITCH = ClosureScore(
 
 def closer_of(folder: Path, width: float, heading: float) -> close_wound.Closer:
     """Both arms before a wound of that width."""
-    scenes = close_wound.SCENE.parents[1]
-    for name, text in author_soft_closing.texts(width, None, heading).items():
-        (folder / name).write_text(text.replace(" ../", f" {scenes}/"), encoding="utf-8")
-    simulation = ligature.Simulation(ligature.load(folder / "launch.yaml", roots=[scenes]))
-    return close_wound.Closer(simulation, 0)
+    scene = authored(author_soft_closing.texts(width, None, heading), folder, close_wound.SCENE.parents[1])
+    return close_wound.Closer(ligature.Simulation(scene), 0)
 
 
 def test_it_counts_where_the_stitch_passes_both_lips_and_the_knot_holds() -> None:

@@ -45,16 +45,10 @@ class Releases:
         """The bodies whose ends have come off."""
         return [attachment.body for (_, attachment), off in zip(self._ends, self.off, strict=True) if off]
 
-    def look(self) -> bool:
-        """Let ends come off that were pulled too much in the last tick; returns whether one did."""
-        pulled = [
-            off or bool(np.linalg.norm(self._joints.load[j, :3]) > most)
-            for (j, _), most, off in zip(self._ends, self._most, self.off, strict=True)
-        ]
-        came = pulled != list(self.off)
-        if came:
-            self.set(tuple(pulled))
-        return came
+    def look(self) -> None:
+        """Let ends come off that were pulled too much in the last tick."""
+        pulls = [np.linalg.norm(self._joints.load[j, :3]) for j, _ in self._ends]
+        self.set(tuple(off or bool(p > most) for p, most, off in zip(pulls, self._most, self.off, strict=True)))
 
     def set(self, off: tuple[bool, ...]) -> None:
         """Say which ends are off."""
