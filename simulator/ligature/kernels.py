@@ -67,6 +67,11 @@ def inlined(function: Function) -> Function:
     return compile_with(function, error_model="numpy", _nrt=False, forceinline=True)
 
 
+def released(function: Function) -> Function:
+    """Like `compiled`, for what takes milliseconds: other threads of Python run meanwhile."""
+    return compile_with(function, nogil=True)
+
+
 def compile_with(function: Function, **options: Any) -> Function:
     """Like `compiled`, with options of `numba.njit`."""
     if numba.config.DISABLE_JIT:

@@ -82,7 +82,7 @@ def main() -> int:
                 f"{format}: {one['MB']:.1f} MB in {one['seconds']:.1f} s, {one['processor']:.1f} of the processor\n"
             )
     ledger.note("datasets", found)
-    sys.stdout.write(f"load of the machine at the start: {load:.1f}\n")
+    sys.stdout.write(f"at the start: load {load:.1f}, reference {reference:.0f} us\n")
     return 0
 
 

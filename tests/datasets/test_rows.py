@@ -27,7 +27,7 @@ def test_pictures_are_read_as_they_were_written(
     with h5py.File("x", "w", driver="core", backing_store=False) as file:
         rows = EpisodeRows(file)
         for picture in drawn:
-            rows.append_picture("a/rgb", Packed.of(np.asfortranarray(picture), dtype), units="depth_unit")
+            rows.append_picture("a/rgb", Packed.of(np.asfortranarray(picture)), units="depth_unit")
         rows.finish()
         kept = file["a/rgb"]
         assert (kept.chunks, kept.compression, kept.shuffle) == ((1, *shape), "gzip", True)

@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ligature.datasets import DatasetError, DatasetWriter, rows
 from ligature.datasets.store import episode_names, join, opened
+from ligature.datasets.writer import _IMPATIENCE, DEPTH_UNIT, IMPATIENT, _count
 from ligature.render.cameras import CameraHandle
 from ligature.render.target import Exposure
 
@@ -71,9 +72,9 @@ def test_pictures_are_packed_in_another_thread_while_those_of_the_next_sample_ar
 
         monkeypatch.setattr(owner, method, noted)
 
-    def packed(picture: Any, dtype: str) -> rows.Packed:
+    def packed(picture: Any) -> rows.Packed:
         packing.append(threading.current_thread())
-        return real(picture, dtype)
+        return real(picture)
 
     real = rows.Packed.of
     monkeypatch.setattr(rows.Packed, "of", packed)
@@ -364,3 +365,39 @@ def test_tissue_is_sampled_with_its_punctures_and_forces(tmp_path: Path) -> None
             np.testing.assert_allclose(block[name][:], expected, rtol=1e-5, atol=1e-6, err_msg=name)
         assert np.abs(np.diff(block["points"][:], axis=0)).max() > 0.0
         assert all("units" in block[name].attrs for name in block)
+
+
+def test_depth_is_kept_in_whole_units_of_two_bytes() -> None:
+    rng = np.random.default_rng(4)
+    metres = rng.choice([1.0, 10.0, 1e3, 1e30], (40, 30)) * rng.uniform(0.0, 1.0, (40, 30))
+    metres[rng.random(metres.shape) < 0.2] = np.inf
+    metres, numbers = metres.astype("f4"), rng.integers(0, 2**16, metres.shape, dtype=np.int32)
+    depth, ids = np.zeros((2, *metres.shape), dtype=np.uint16)
+    _count(metres, numbers, depth, ids)
+    steps = np.where(np.isfinite(metres), metres / np.float32(DEPTH_UNIT), 0.0)
+    assert (depth == np.minimum(steps.round(), 65535.0)).all() and (ids == numbers).all()
+    assert (depth == 65535).any() and (depth == 0).any()
+
+
+def test_threads_wait_as_ever_once_no_writer_develops_pictures() -> None:
+    usual, seen = sys.getswitchinterval(), []
+    sys.setswitchinterval(0.003)
+    try:
+        both = threading.Barrier(2)
+
+        def develop(longer: bool) -> None:
+            with _IMPATIENCE:
+                both.wait(30.0)
+                seen.append(sys.getswitchinterval())
+                both.wait(30.0)
+                if longer:
+                    other.join(30.0)
+                    seen.append(sys.getswitchinterval())
+
+        first, other = (threading.Thread(target=develop, args=(longer,)) for longer in (True, False))
+        for thread in (first, other):
+            thread.start()
+        first.join(30.0)
+        assert seen == pytest.approx([IMPATIENT] * 3) and sys.getswitchinterval() == pytest.approx(0.003)
+    finally:
+        sys.setswitchinterval(usual)

@@ -163,7 +163,7 @@ def _write_pictures(
     for name, topic in topics.items():
         K = intrinsics(bag, topic, size)
         for picture in pictures(bag, topic, stamps.tolist(), size):
-            rows.append_picture(f"cameras/{name}/rgb", Packed.of(picture, "u1"))
+            rows.append_picture(f"cameras/{name}/rgb", Packed.of(picture))
             store.check()
             if K is not None:
                 rows.append(f"cameras/{name}/intrinsics", K, "f8", units="px")

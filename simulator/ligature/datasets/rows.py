@@ -13,6 +13,8 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from ligature.kernels import released
+
 GATHERED = 256
 """Rows of a chunk, and so rows that wait for their chunk to be full."""
 
@@ -31,11 +33,22 @@ class Packed(NamedTuple):
     content: bytes
 
     @classmethod
-    def of(cls, picture: Any, dtype: str) -> Packed:
-        """A ``picture`` with numbers of another type: first bytes of all numbers, then the second ones; deflated."""
-        array = np.ascontiguousarray(picture, dtype=dtype)
-        planes = np.ascontiguousarray(array.reshape(-1).view(np.uint8).reshape(-1, array.itemsize).T)
-        return cls(array.shape, dtype, bytes(isal_zlib.compress(planes, EFFORT)))
+    def of(cls, picture: NDArray[Any]) -> Packed:
+        """A ``picture``: first bytes of all its numbers, then the second ones; deflated."""
+        numbers = np.ascontiguousarray(picture).reshape(-1).view(np.uint8).reshape(-1, picture.itemsize)
+        planes = numbers
+        if picture.itemsize > 1:
+            planes = np.empty(numbers.shape[::-1], dtype=np.uint8)
+            _turn(numbers, planes)
+        return cls(picture.shape, picture.dtype.str, bytes(isal_zlib.compress(planes, EFFORT)))
+
+
+@released
+def _turn(rows: NDArray[np.uint8], columns: NDArray[np.uint8]) -> None:
+    """Fill ``columns`` (m, n) with ``rows`` (n, m)."""
+    for k in range(rows.shape[1]):
+        for i in range(rows.shape[0]):
+            columns[k, i] = rows[i, k]
 
 
 class EpisodeRows:

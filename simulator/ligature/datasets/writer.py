@@ -6,6 +6,9 @@ that has ended is on the disk (`ligature.datasets.store`), whatever interrupts t
 
 from __future__ import annotations
 
+import sys
+import threading
+from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -23,6 +26,7 @@ from ligature.datasets.events import ARM_EVENTS, NEEDLE_EVENTS, EventWatch
 from ligature.datasets.labels import ACTIVITIES, GESTURES, MOST_PHASES, ActivityWatch
 from ligature.datasets.rows import EpisodeRows, Packed, add_actions
 from ligature.datasets.store import EpisodeStore, unwritable
+from ligature.kernels import released
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
 from ligature.model.soft import TissueBody
 from ligature.paths import printable
@@ -41,6 +45,12 @@ OWN = frozenset({
     "samples",
 })  # fmt: skip
 """Attributes that no remark may replace."""
+
+WAITING = 2
+"""Samples of which pictures may still be developed when the next one begins; each takes megabytes."""
+
+IMPATIENT = 2e-4
+"""Seconds for which the thread that develops pictures waits until it may go on."""
 
 EARLY = 1e-6
 """Seconds before its time at which a sample is taken, for the rounding of simulated time."""
@@ -112,7 +122,7 @@ class DatasetWriter:
         self._episode: h5py.File | None = None
         self._rows: EpisodeRows | None = None
         self._exposures: dict[str, Exposure] = {}
-        self._developed: Future[list[Picture]] | None = None
+        self._developed: deque[Future[list[Picture]]] = deque()
         self._laboratory = ThreadPoolExecutor(1, "pictures")
         self._shapes: dict[str, tuple[int, ...]] = {}
         self._samples, self._due, self._ended = 0, 0.0, False
@@ -172,7 +182,7 @@ class DatasetWriter:
                 self._begin(time)
             self._shapes = {name: value.shape for name, value in extras.items()}
             assert self._rows is not None
-            self._append_pictures()
+            self._append_pictures(WAITING)
             self._expose()
             for name, value, options in self._values(phase, arms):
                 self._rows.append(name, value, **options)
@@ -202,7 +212,7 @@ class DatasetWriter:
 
     def _begin(self, time: float) -> None:
         self._episode = self._store.begin()
-        self._rows, self._exposures, self._developed = EpisodeRows(self._episode), {}, None
+        self._rows, self._exposures, self._developed = EpisodeRows(self._episode), {}, deque()
         self._samples, self._due = 0, time
         self._events.begin()
 
@@ -217,9 +227,8 @@ class DatasetWriter:
         _check_texts(remarks)
         with self._writing():
             assert self._rows is not None
-            self._append_pictures()
             self._develop()
-            self._append_pictures()
+            self._append_pictures(0)
             self._rows.finish()
             attributes = self._episode.attrs
             attributes["success"], attributes["samples"], attributes["task"] = success, self._samples, self._task
@@ -235,7 +244,7 @@ class DatasetWriter:
         self._store.drop()
 
     def _forget(self) -> None:
-        self._episode, self._rows, self._exposures, self._developed = None, None, {}, None
+        self._episode, self._rows, self._exposures, self._developed = None, None, {}, deque()
 
     def _values(self, phase: str, doers: Collection[str] | None) -> Iterator[Value]:
         """The values of one sample."""
@@ -298,16 +307,15 @@ class DatasetWriter:
         for exposure in self._exposures.values():
             exposure.fetch()  # needs the thread of OpenGL
         if self._exposures:
-            self._developed = self._laboratory.submit(_developed, self._exposures)
+            self._developed.append(self._laboratory.submit(_developed, self._exposures))
             self._exposures = {}
 
-    def _append_pictures(self) -> None:
-        """Add the pictures that have been developed."""
-        if self._developed is not None:
+    def _append_pictures(self, most: int) -> None:
+        """Add the pictures that have been developed; those of ``most`` samples may wait for it."""
+        while self._developed and (len(self._developed) > most or self._developed[0].done()):
             assert self._rows is not None
-            for name, picture, notes in self._developed.result():
+            for name, picture, notes in self._developed.popleft().result():
                 self._rows.append_picture(name, picture, **notes)
-            self._developed = None
 
     # --- the end ----------------------------------------------------------------------------
 
@@ -366,14 +374,54 @@ class DatasetWriter:
 def _developed(exposures: Mapping[str, Exposure]) -> list[Picture]:
     """The pictures of one sample."""
     found: list[Picture] = []
-    for name, exposure in exposures.items():
-        frame = exposure.frame()
-        steps = np.where(np.isfinite(frame.depth), frame.depth / DEPTH_UNIT, 0.0)
-        depth = np.minimum(steps.round(), 65535.0)
-        found.append((f"cameras/{name}/rgb", Packed.of(frame.rgb, "u1"), {}))
-        found.append((f"cameras/{name}/depth", Packed.of(depth, "u2"), {"units": "depth_unit"}))
-        found.append((f"cameras/{name}/ids", Packed.of(frame.ids, "u2"), {}))
+    with _IMPATIENCE:
+        for name, exposure in exposures.items():
+            frame = exposure.frame()
+            depth, ids = (np.empty(frame.depth.shape, dtype=np.uint16) for _ in range(2))
+            _count(frame.depth, frame.ids, depth, ids)
+            found.append((f"cameras/{name}/rgb", Packed.of(frame.rgb), {}))
+            found.append((f"cameras/{name}/depth", Packed.of(depth), {"units": "depth_unit"}))
+            found.append((f"cameras/{name}/ids", Packed.of(ids), {}))
     return found
+
+
+class _Impatience:
+    """A context in which a thread of Python waits for another one for `IMPATIENT` seconds instead of 5 ms.
+
+    A thread that compresses pictures leaves Python and comes back dozens of times, and waited longer than it worked.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._users, self._usual = threading.Lock(), 0, 0.0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._users:
+                self._usual = sys.getswitchinterval()
+                sys.setswitchinterval(min(IMPATIENT, self._usual))
+            self._users += 1
+
+    def __exit__(self, *_error: object) -> None:
+        with self._lock:
+            self._users -= 1
+            if not self._users:
+                sys.setswitchinterval(self._usual)
+
+
+_IMPATIENCE = _Impatience()
+
+
+@released
+def _count(
+    metres: NDArray[np.float32], numbers: NDArray[np.int32], depth: NDArray[np.uint16], ids: NDArray[np.uint16]
+) -> None:
+    """Fill ``depth`` with whole depth units, 0 for infinity, and ``ids`` with ``numbers``; all (h, w)."""
+    unit = np.float32(DEPTH_UNIT)
+    for y in range(metres.shape[0]):
+        for x in range(metres.shape[1]):
+            steps = np.rint(metres[y, x] / unit)
+            depth[y, x] = np.uint16(min(steps, np.float32(65535.0))) if np.isfinite(metres[y, x]) else 0
+            ids[y, x] = numbers[y, x]
 
 
 def _check_texts(remarks: Mapping[str, Any]) -> None:

@@ -189,10 +189,11 @@ class Seen:
 
     def __init__(self, mask: NDArray[np.bool_], depth: Array, instances: NDArray[np.void]) -> None:
         self.mask, self.depth, self.instances = mask, depth, instances
+        self._rows, self._before = np.flatnonzero(mask), [0, *np.cumsum(mask).tolist()]
 
     def rows(self, batch: Batch) -> NDArray[np.int64]:
         """Rows of the instances of ``batch`` that are seen."""
-        return np.flatnonzero(self.mask[batch.rows]) + batch.rows.start
+        return self._rows[self._before[batch.rows.start] : self._before[batch.rows.stop]]
 
 
 def _bounding_sphere(triangles: Triangles) -> tuple[float, float, float, float]:

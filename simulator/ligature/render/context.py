@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+from collections.abc import Callable
 
 import moderngl
 
@@ -47,6 +49,13 @@ def tidy(context: moderngl.Context) -> moderngl.Context:
     """``context``, whose ``gc`` gives objects back that Python has dropped, wherever Python found that they are."""
     context.gc_mode = "context_gc"
     return context
+
+
+def finish_of(context: moderngl.Context) -> Callable[[], None]:
+    """What waits until all is drawn; other threads of Python run meanwhile, which they do not in moderngl's calls."""
+    load = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
+    address = load("glFinish") if load else 0
+    return ctypes.CFUNCTYPE(None)(address) if address else context.finish
 
 
 SOFTWARE = ("llvmpipe", "softpipe", "swr", "software")

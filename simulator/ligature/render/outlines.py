@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ligature.kernels import compiled
+from ligature.kernels import compiled, released
 
 CONTRAST = 20
 """Smallest difference in any channel, of 255, that is an edge."""
@@ -33,14 +33,10 @@ def smoothed(rgba: NDArray[np.uint8], keyed: bool = True) -> NDArray[np.uint8]:
     """
     rgba = np.ascontiguousarray(rgba)
     keys, step = np.ascontiguousarray(rgba[..., 3]), KEY_STEP if keyed else 0
-    below, right = np.zeros(keys.shape, dtype=np.uint8), np.zeros(keys.shape, dtype=np.uint8)
-    _differ(rgba, below, np.flatnonzero(_jumps(keys[:-1], keys[1:], step)), 1, 0)
-    _differ(rgba, right, np.flatnonzero(_jumps(keys[:, :-1], keys[:, 1:], step)), 0, 1)
-    lying, standing = _edges(below, right)
+    lies = np.flatnonzero(_jumps(keys[:-1], keys[1:], step))
+    stands = np.flatnonzero(_jumps(keys[:, :-1], keys[:, 1:], step))
     rgb = np.empty((*keys.shape, 3), dtype=np.uint8)
-    _copy_colours(rgba, rgb)
-    _mix(rgba, rgb, lying, standing, False)
-    _mix(rgba, rgb, np.ascontiguousarray(standing.T), np.ascontiguousarray(lying.T), True)
+    _smooth(rgba, rgb, lies, stands)
     return rgb
 
 
@@ -49,12 +45,24 @@ def _jumps(a: NDArray[np.uint8], b: NDArray[np.uint8], step: int) -> NDArray[np.
     return (a - b + np.uint8(step - 1)) > 2 * step - 2 if step else np.ones(a.shape, dtype=np.bool_)
 
 
-@compiled
-def _copy_colours(rgba: NDArray[np.uint8], rgb: NDArray[np.uint8]) -> None:
+@released
+def _smooth(
+    rgba: NDArray[np.uint8], rgb: NDArray[np.uint8], lies: NDArray[np.int64], stands: NDArray[np.int64]
+) -> None:
+    """Fill ``rgb`` (h, w, 3) with the smooth picture of ``rgba`` (h, w, 4).
+
+    Edges may be between the pixels and those below of which the numbers are in ``lies``, and those right of ``stands``.
+    """
     height, width = rgba.shape[:2]
+    below, right = np.zeros((height, width), dtype=np.uint8), np.zeros((height, width), dtype=np.uint8)
+    _differ(rgba, below, lies, 1, 0)
+    _differ(rgba, right, stands, 0, 1)
+    lying, standing = _edges(below, right)
     for y in range(height):
         for x in range(width):
             rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2] = rgba[y, x, 0], rgba[y, x, 1], rgba[y, x, 2]
+    _mix(rgba, rgb, lying, standing, False)
+    _mix(rgba, rgb, np.ascontiguousarray(standing.T), np.ascontiguousarray(lying.T), True)
 
 
 @compiled

@@ -9,6 +9,7 @@ from importlib import resources
 from typing import Any
 
 import moderngl
+import numpy as np
 
 _INCLUDE = re.compile(r'^#include "(\w+\.glsl)"$', re.MULTILINE)
 
@@ -31,6 +32,7 @@ class Program:
     def __init__(self, linked: moderngl.Program) -> None:
         self.linked = linked
         self._uniforms: dict[str, moderngl.Uniform] = {}
+        self._values: dict[str, Any] = {}
         self.attributes: list[str] = []
         self.samplers: list[str] = []
         for name in linked:
@@ -52,7 +54,10 @@ class Program:
             return
         if isinstance(value, list):
             value = value[: uniform.array_length] if uniform.array_length > 1 else value[0]
-        uniform.value = value
+        if isinstance(value, np.ndarray):
+            value = tuple(value.tolist())
+        if self._values.get(name) != value:  # a program keeps it from picture to picture
+            uniform.value = self._values[name] = value
 
     def write(self, name: str, matrix: Any) -> None:
         """Set a uniform to ``matrix`` (n, n), or an array to matrices (m, n, n), as far as the compiler kept it."""

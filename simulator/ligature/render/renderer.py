@@ -21,7 +21,7 @@ from ligature.model.scene import Scene
 from ligature.model.shapes import ShaderFiles
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
-from ligature.render.context import create_context, draws_on_processor
+from ligature.render.context import create_context, draws_on_processor, finish_of
 from ligature.render.kept import Keeper, Kept
 from ligature.render.lights import Lights, LightSettings, ShadowView
 from ligature.render.look import Look, brighter, tinted
@@ -86,6 +86,7 @@ class Renderer:
         self._context = context or create_context()
         self._end = None if context else weakref.finalize(self, self._context.release)
         _alive.add(self)
+        self._finish = finish_of(self._context)
         self._smoothed = samples is None and draws_on_processor(self._context)
         wanted = SAMPLES if samples is None else samples
         self._samples = 0 if self._smoothed else min(wanted, self._context.max_samples)
@@ -203,6 +204,7 @@ class Renderer:
     def _read(self, target: Target, colours: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]) -> Callable[[], Frame]:
         """Copy the picture in ``target``, which is free for another one then; returns what develops the copy."""
         with self._context:
+            self._finish()  # reading would wait as well, and hold up all other threads meanwhile
             readings = target.read()
             self._targets.append(target)  # the newest come last
             del self._targets[:-MAX_TARGETS]

@@ -10,6 +10,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.kernels import released
+
 PASSES = {
     "rgb": (4, "f1"),
     "depth": (1, "f4"),
@@ -136,12 +138,30 @@ def developed(readings: Readings, colours: Callable[[NDArray[np.uint8]], NDArray
         if name == "rgb":
             arrays[name] = colours(array)
         elif name == "depth":
-            arrays[name] = np.where(array[..., 0] == 0.0, np.float32(np.inf), array[..., 0])  # 0: nothing was drawn
+            arrays[name] = np.empty(array.shape[:2], dtype=np.float32)
+            _fill_distances(array[..., 0], arrays[name])
         elif name in ("ids", "parts"):
-            arrays[name] = array[..., 0].astype(np.int32)
+            arrays[name] = np.empty(array.shape[:2], dtype=np.int32)
+            _fill_numbers(array[..., 0], arrays[name])
         elif name == "normals":
             arrays[name] = array[..., :3]
     return Frame(**{name: np.ascontiguousarray(array) for name, array in arrays.items()})
+
+
+@released
+def _fill_distances(read: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Fill ``out`` (h, w) with metres; 0 was read where nothing was drawn."""
+    for y in range(read.shape[0]):
+        for x in range(read.shape[1]):
+            out[y, x] = np.inf if read[y, x] == 0.0 else read[y, x]
+
+
+@released
+def _fill_numbers(read: NDArray[np.float32], out: NDArray[np.int32]) -> None:
+    """Fill ``out`` (h, w) with whole numbers."""
+    for y in range(read.shape[0]):
+        for x in range(read.shape[1]):
+            out[y, x] = np.int32(read[y, x])
 
 
 class Exposure:
