@@ -79,9 +79,9 @@ short springs back when the ends are slack; width of the wound where the lips me
 EASED = np.array([0.030, 0.0, 0.008]), np.array([-0.028, 0.014, 0.005])
 """Towards where the right and the left hand ease their ends."""
 
-SLACK, EVEN, LOOSE = 0.05, 0.8, 15
-"""Newtons below which an end is slack; share of the other end's tension above which a hand eases its own; actions by
-which both hands go on once both ends are slack."""
+SLACK, EVEN, LOOSE = 0.005, 0.8, 60
+"""Newtons below which an end is slack: 0.05 still hold a knot shut that opens in no hand. Share of the other end's
+tension above which a hand eases its own; actions by which both hands go on once both ends are slack."""
 
 TIMES, MOST = 8, 300
 """How often the knot is slid and locked at most, and actions of a slide, of a lock and of easing at most."""
@@ -137,6 +137,7 @@ class Knotting(Knotter):
     """Both hands, and the thread, over soft tissue: that bends the free end, so they look where it is."""
 
     UP, LOCKED, TIGHT = np.array([-0.031, 0.047, 0.039]), 10.0, 0.1
+    FURTHER = 5
 
     def bring(self) -> Iterator[Array]:
         """As ever, then the right hand turns about its tool until the free end runs where the left one can take it."""
@@ -151,7 +152,7 @@ class Knotting(Knotter):
     def under(self) -> Iterator[Array]:
         """As ever, then the left hand moves until what the right one is to take is where that reaches it."""
         yield from super().under()
-        away = self.goal.vessel + OFFERED - self.goal.points()[self.end(LEFT) + BEYOND]
+        away = self.goal.vessel + OFFERED - self.goal.points()[self.beyond(LEFT, BEYOND)]
         yield from self.go(LEFT, self.moved(LEFT, *away), SHUT, SLOW)
 
     def draw(self) -> Iterator[Array]:

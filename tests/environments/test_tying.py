@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ligature.environments.goals import FirstThrow, KnotTie
-from ligature.environments.goals.ligating import LYING, Ligating
-from ligature.environments.knotting import TRIES, Knotter
+from ligature.environments.goals.ligating import LEFT, LYING, RIGHT, Ligating
+from ligature.environments.knotting import Knotter
 from ligature.environments.suturing import _scene
-from ligature.environments.tying import Missed, shorter
+from ligature.environments.tying import TRIES, Missed, shorter
 from ligature.model.frames import frame
 from scipy.spatial.transform import Rotation
 
@@ -138,25 +138,33 @@ def test_of_two_grasps_half_a_turn_apart_a_hand_takes_the_one_that_turns_it_less
 
 
 class Clumsy(Knotter):
-    """Misses the second throw so many times."""
+    """Misses either throw so many times."""
+
+    FURTHER = 4
 
     def __init__(self, misses: int) -> None:
         self.misses, self.done = misses, ""
+        self.places: list[int] = []
 
-    def hook(self) -> Iterator[np.ndarray]:
-        yield from self._do("hook ")
+    def bring(self) -> Iterator[np.ndarray]:
+        yield from self._do("bring ")
 
-    def under(self) -> Iterator[np.ndarray]:
-        yield from self._do("under ")
+    hook = under = bring
 
-    def back_through(self) -> Iterator[np.ndarray]:
+    def through(self) -> Iterator[np.ndarray]:
         yield from self._do("through ")
+        self.places.append(self.further)
         self.misses -= 1
         if self.misses >= 0:
             raise Missed("the loop is not around the tool")
 
+    back_through = through
+
+    def draw(self) -> Iterator[np.ndarray]:
+        yield from self._do("draw ")
+
     def leave(self, number: int) -> Iterator[np.ndarray]:
-        yield from self._do("leave ")
+        yield from self._do(f"leave{number} ")
 
     def _do(self, name: str) -> Iterator[np.ndarray]:
         self.done += name
@@ -164,12 +172,18 @@ class Clumsy(Knotter):
 
 
 @pytest.mark.parametrize("misses", range(TRIES))
-def test_a_missed_second_throw_is_made_again(misses: int) -> None:
+def test_a_missed_throw_is_made_again_further_along_the_thread(misses: int) -> None:
+    knotter = Clumsy(misses)
+    assert len(list(knotter.first())) == 3 * misses + 3
+    assert knotter.done == f"bring through leave{LEFT} " * misses + "bring through draw "
+    assert knotter.places == [4 * k for k in range(misses + 1)]
     knotter = Clumsy(misses)
     assert len(list(knotter.second())) == 4 * misses + 3
-    assert knotter.done == "hook under through leave " * misses + "hook under through "
+    assert knotter.done == f"bring bring through leave{RIGHT} " * misses + "bring bring through "
+    assert knotter.places == [4 * k for k in range(misses + 1)]
 
 
-def test_a_second_throw_that_is_missed_every_time_is_reported() -> None:
-    with pytest.raises(Missed, match="not around the tool"):
-        list(Clumsy(TRIES).second())
+def test_a_throw_that_is_missed_every_time_is_reported() -> None:
+    for throw in (Knotter.first, Knotter.second):
+        with pytest.raises(Missed, match="not around the tool"):
+            list(throw(Clumsy(TRIES)))

@@ -27,9 +27,6 @@ Array = NDArray[np.float64]
 
 MIRRORED = np.array([-1.0, 1.0, 1.0])
 
-TRIES = 3
-"""How often it makes the second throw at most, while the left hand has the long end."""
-
 BEHIND = np.array([-0.009, 0.009, 0.028]), np.array([-0.009, 0.009, 0.004])
 """Where the right tool comes down behind it, on the side of the vessel."""
 
@@ -101,16 +98,7 @@ class Knotter(Tier):
 
     def second(self) -> Iterator[Array]:
         """The second throw, up to where the right hand has drawn the end through it; a missed one is made again."""
-        for left in reversed(range(TRIES)):
-            try:
-                yield from self.hook()
-                yield from self.under()
-                yield from self.back_through()
-                return
-            except Missed:
-                if not left:
-                    raise
-                yield from self.leave(RIGHT)
+        yield from self.tries(RIGHT, self.hook, self.under, self.back_through)
 
     def at(self, way: Array, along: Array, place: Array) -> Array:
         """Pose (4, 4) of a tool with the thread at a place that is given from the vessel."""
@@ -136,7 +124,7 @@ class Knotter(Tier):
 
         Raises `Missed` where that would make no square knot.
         """
-        element = self.end(LEFT) + BEYOND
+        element = self.beyond(LEFT, BEYOND)
         way = self.goal.points()[element] - (self.goal.vessel + GAP)
         yield from self.go(RIGHT, drawn_back(self.grasp(RIGHT, way, element), 0.010), SHUT, SLOW)
         yield from self.take(RIGHT, way, element)

@@ -51,6 +51,9 @@ APPROACH = ((0.052, 1.0), (0.026, 1.0), (0.010, 0.6))
 DRAWN = ((-0.016, -0.002, 0.014, 0.25), (-0.066, -0.020, 0.020, 1.2))
 """Where the left hand draws the throw, one place after the other, from the vessel, and newtons with which it stops."""
 
+TRIES = 3
+"""How often a hand tries to take the thread from the other one at most."""
+
 WRONG = 4
 """Elements from the one that it was to take at which a hand has taken another strand."""
 
@@ -82,6 +85,11 @@ def shorter(T: Array, tool: Array) -> Array:
 class Tier:
     """Both hands, and the thread."""
 
+    FURTHER = 0
+    """Elements by which a hand takes the thread further from the other one each time that it missed it."""
+
+    further = 0
+
     def __init__(self, hand: Hand) -> None:
         goal = hand.env.goal
         assert isinstance(goal, Ligating)
@@ -89,9 +97,21 @@ class Tier:
 
     def first(self) -> Iterator[Array]:
         """The first throw, drawn by the left hand."""
-        yield from self.bring()
-        yield from self.through()
+        yield from self.tries(LEFT, self.bring, self.through)
         yield from self.draw()
+
+    def tries(self, number: int, *steps: Callable[[], Iterator[Array]]) -> Iterator[Array]:
+        """Steps at whose end a hand takes the thread from the other one; where it missed that, they are made again."""
+        for count in range(TRIES):
+            self.further = count * self.FURTHER
+            try:
+                for step in steps:
+                    yield from step()
+                return
+            except Missed:
+                if count == TRIES - 1:
+                    raise
+                yield from self.leave(number)
 
     def bring(self) -> Iterator[Array]:
         """The right hand lays the long end over the short one, and brings it below that."""
@@ -103,7 +123,7 @@ class Tier:
 
         Raises `Missed` where the loop is not around its tool then.
         """
-        element = self.end(RIGHT) + BESIDE
+        element = self.beyond(RIGHT, BESIDE)
         way = self.goal.points()[element] - self.gap()
         for back, pace in APPROACH:
             yield from self.go(LEFT, drawn_back(self.grasp(LEFT, way, element), back), SHUT, pace)
@@ -130,6 +150,10 @@ class Tier:
         if held is None:
             raise Missed(f"the {SIDES[number]} hand lost the thread")
         return held
+
+    def beyond(self, number: int, ahead: int) -> int:
+        """The element, ``ahead`` or more from a hand, at which the other one takes the thread."""
+        return self.end(number) + ahead + self.further
 
     def pull(self, number: int) -> float:
         """Tension of the thread beside a hand; raises `Missed` when it holds none."""
