@@ -9,7 +9,6 @@ from importlib import resources
 from typing import Any
 
 import moderngl
-import numpy as np
 
 _INCLUDE = re.compile(r'^#include "(\w+\.glsl)"$', re.MULTILINE)
 
@@ -48,14 +47,15 @@ class Program:
         return name in self._uniforms
 
     def set(self, name: str, value: Any) -> None:
-        """Set a uniform to a number or tuple, or an array to a list of them, as far as the compiler kept it."""
+        """Set a uniform to a number or tuple, or an array to a list of them, as far as the compiler kept it.
+
+        No other way sets that uniform: one that has the value already is not set again.
+        """
         uniform = self._uniforms.get(name)
         if uniform is None:
             return
         if isinstance(value, list):
             value = value[: uniform.array_length] if uniform.array_length > 1 else value[0]
-        if isinstance(value, np.ndarray):
-            value = tuple(value.tolist())
         if self._values.get(name) != value:  # a program keeps it from picture to picture
             uniform.value = self._values[name] = value
 
