@@ -65,7 +65,7 @@ def test_the_demonstrations_compile_nothing_after_what_is_compiled_ahead(tmp_pat
     env = {**os.environ, "LIGATURE_CACHE": str(tmp_path)}
     words = [sys.executable, "-m", "ligature", "compile"]
     subprocess.run(words, env=env, check=True, capture_output=True, timeout=1800)
-    for example, options in (("suture", ["--throws", "1"]), ("suture_tissue", [])):
+    for example, options in (("record_dataset", [str(tmp_path / "throw.h5")]), ("suture_tissue", [])):
         words = [sys.executable, "-c", LATE, str(ROOT / "examples" / f"{example}.py"), *options]
         done = subprocess.run(words, env=env, capture_output=True, text=True, timeout=1800)
         assert done.stdout.splitlines()[-1] == "late: []", done.stdout + done.stderr

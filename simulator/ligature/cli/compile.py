@@ -9,6 +9,7 @@ import time
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
@@ -16,6 +17,7 @@ from rich.console import Console
 import ligature
 from ligature.bundle import SCENES
 from ligature.cli.numbers import counted
+from ligature.datasets import DatasetError, DatasetWriter
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
 from ligature.model.piercing import Needle
 from ligature.paths import reason
@@ -90,8 +92,8 @@ def _start(scenes: Sequence[Path], console: Console) -> tuple[subprocess.Popen[s
 def run_for_a_moment(launch: Path) -> None:
     """Call what a run of the scene calls; raises `ligature.SceneError`.
 
-    Ticks, arms that move, a needle and its thread that pass through tissue, a restored snapshot, a picture: what is
-    compiled here does not stop a run for seconds where it is first needed.
+    Ticks, arms that move, a needle and its thread that pass through tissue, a restored snapshot, pictures, a dataset:
+    what is compiled here does not stop a run for seconds where it is first needed.
     """
     simulation = ligature.Simulation(ligature.load(launch))
     simulation.step(TICKS)
@@ -139,7 +141,7 @@ def _pierce(simulation: ligature.Simulation, needle: Needle, throw: Throw) -> No
 
 
 def _draw(simulation: ligature.Simulation) -> None:
-    """Pictures of the first camera, where there is one and OpenGL, until they begin with what stands still."""
+    """Take pictures with the first camera, if any, until they begin with what stands still; then record one sample."""
     from ligature.render.context import RenderUnavailable
 
     for camera in list(simulation.cameras)[:1]:
@@ -149,6 +151,8 @@ def _draw(simulation: ligature.Simulation) -> None:
                 simulation.step(TICKS)
         except RenderUnavailable:
             return
+        with TemporaryDirectory() as folder, DatasetWriter(Path(folder) / "moment.h5", simulation, [camera]) as writer:
+            writer.sample()
 
 
 def main() -> None:
@@ -156,7 +160,7 @@ def main() -> None:
     try:
         for argument in sys.argv[1:]:
             run_for_a_moment(Path(argument))
-    except ligature.SceneError as error:
+    except (ligature.SceneError, DatasetError) as error:
         sys.exit(str(error))
     except OSError as error:
         sys.exit(reason(error))

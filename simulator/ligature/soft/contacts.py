@@ -31,9 +31,6 @@ Flags = NDArray[np.bool_]
 MAX_APPROACH = 1.0
 """Speed in m/s of bodies between two looks at them."""
 
-CAPACITY_FREE = 120
-"""Most points of contact of a body of tissue that nothing holds, which stands on all nodes of a side."""
-
 MAX_WAIT = 64
 """Most ticks between two looks."""
 
@@ -90,10 +87,9 @@ class BodyContacts:
         self._piercers = [(self.listed.index(p.body.index) + 1, p) for p in piercers if p.body.index in self.listed]
         self._around = _around([own, *self.listed])
         self._static = [True, *(scene.bodies[b].static for b in self.listed)]
-        room = CAPACITY_FREE if block.elastic.floats else arrays.CAPACITY
         self._contacts = Contacts(
-            arrays.touching(room), arrays.partners(len(self.listed) + 2), self._gather(scene),
-            arrays.scratch(capacity=room), np.zeros(1, np.int64),
+            arrays.touching(), arrays.partners(len(self.listed) + 2), self._gather(scene),
+            arrays.scratch(), np.zeros(1, np.int64),
         )  # fmt: skip
         self._touching = self._contacts.touching
         self._contacts.partners.friction[1:-1] = [

@@ -255,9 +255,8 @@ def _nearest(field: Field, lying: Lying, reach: float) -> int:
     for g in range(field.group_box.shape[0]):
         if _outside(field.group_box[g], p, reach):
             continue
-        for q in range(g * GROUP, min(field.faces.shape[0], (g + 1) * GROUP)):
-            node = field.faces[q, 0] == field.faces[q, 1]
-            if node or lying.wall[q] or field.core[q] > 0.0 or _outside(field.face_box[q], p, reach):
+        for q in range(g * GROUP, min(field.faces.shape[0] - field.around.shape[0], (g + 1) * GROUP)):
+            if lying.wall[q] or field.core[q] > 0.0 or _outside(field.face_box[q], p, reach):
                 continue
             _on_face(field, q, p, lying.found, lying.corner)
             y = lying.found[0]

@@ -269,10 +269,8 @@ def see_puncture(tissue: Integers, frame: Integers, i: int, out: Array) -> None:
     a, b, c, d = nodes[0], nodes[1], nodes[2], nodes[3]
     if weights[4] != 0.0 or weights[5] != 0.0 or weights[6] != 0.0 or weights[7] != 0.0:
         nearest = math.inf
-        for q in range(t.field.faces.shape[0]):
+        for q in range(t.field.faces.shape[0] - t.field.around.shape[0]):
             corner, away = t.field.faces[q], 0.0
-            if corner[0] == corner[1]:
-                continue
             for m in range(3):
                 middle = x[corner[0], m] + x[corner[1], m] + x[corner[2], m] + x[corner[3], m]
                 away += (0.25 * middle - (px if m == 0 else (py if m == 1 else pz))) ** 2

@@ -317,8 +317,8 @@ def _relax(touching: Touching, work: Solve, n: int, a: int) -> float:
             change = -(u[k] + soft * f[k]) / (D[k, k] + soft)
             f[k] += change
             for c in range(n):
-                E, v = work.D[c, a], work.u[c]
-                v[0], v[1], v[2] = v[0] + E[0, k] * change, v[1] + E[1, k] * change, v[2] + E[2, k] * change
+                E, v = work.D[a, c], work.u[c]
+                v[0], v[1], v[2] = v[0] + E[k, 0] * change, v[1] + E[k, 1] * change, v[2] + E[k, 2] * change
             total += change * change
         return total
     stiff, trace, gap, before = 0.0, 0.0, 0.0, 0.0
@@ -344,11 +344,11 @@ def _relax(touching: Touching, work: Solve, n: int, a: int) -> float:
     if cx == 0.0 and cy == 0.0 and cz == 0.0:
         return 0.0
     f[0], f[1], f[2] = f[0] + cx, f[1] + cy, f[2] + cz
-    for c in range(n):
-        E, v = work.D[c, a], work.u[c]
-        v[0] += E[0, 0] * cx + E[0, 1] * cy + E[0, 2] * cz
-        v[1] += E[1, 0] * cx + E[1, 1] * cy + E[1, 2] * cz
-        v[2] += E[2, 0] * cx + E[2, 1] * cy + E[2, 2] * cz
+    for c in range(n):  # D is symmetric, and its row lies together in memory
+        E, v = work.D[a, c], work.u[c]
+        v[0] += E[0, 0] * cx + E[1, 0] * cy + E[2, 0] * cz
+        v[1] += E[0, 1] * cx + E[1, 1] * cy + E[2, 1] * cz
+        v[2] += E[0, 2] * cx + E[1, 2] * cy + E[2, 2] * cz
     return cx * cx + cy * cy + cz * cz
 
 

@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-CAPACITY = 64
-"""Most points of contact of a block with bodies."""
+CAPACITY = 256
+"""Most points of contact of a block with bodies: those of a plate on 15 by 15 cells."""
 
 
 class Touching(NamedTuple):

@@ -1,9 +1,12 @@
-"""Where rigid bodies are nearest to the surface of tissue: each face's deepest point for each convex part; metres.
+"""Where rigid bodies are nearest to the surface of tissue: its deepest points for each convex part; metres.
 
-The best of a few points of a face, from which a search with ever smaller steps goes on. Tissue that nothing holds is
-met at its nodes too, and its faces only where they are deeper than their corners: so it stands on a level face with all
-its nodes, which stay where they are in the material. Faces that are held stop bodies
-that come from inside a little before they reach them: what presses tissue flat does not turn its cells inside out.
+Nodes of the surface are met by themselves; edges at their deepest point, where that is deeper than their nodes; faces
+at theirs, where it is deeper than their edges. So what is flat bears on all nodes that it covers and on all edges that
+its rim crosses, and these points stay where they are in the material. With one point a face, corners would bulge past
+the body, and the point would go from end to end of a rim that crosses the face. The deepest point is the best of a few,
+from which a search with ever smaller steps goes on.
+Faces that are held stop bodies that come from inside a little before they reach them: what presses tissue flat does not
+turn its cells inside out.
 """
 
 from __future__ import annotations
@@ -38,10 +41,10 @@ REACH = 1.5e-3
 """Distance in metres at which a point of contact is let go."""
 
 BULGE = 2e-5
-"""Metres by which a face must be deeper than its corners where these are met by themselves."""
+"""Metres by which a face must be deeper than its edges, and an edge than its nodes."""
 
 KEEP = 1.0
-"""What stands for the distance, in metres, of a face that is not: it keeps its point of contact, if it has one."""
+"""What stands for the distance, in metres, of what is not: it keeps its point of contact, if it has one."""
 
 
 @inlined
@@ -95,8 +98,6 @@ def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
     nx, ny, nz = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     size = math.sqrt(nx * nx + ny * ny + nz * nz)
     edge = math.sqrt(size)
-    if i == j:
-        return _search_node(field, parts, work, c, q, count)
     if core > 0.0:
         _at(x, faces, q, 0.5, 0.5, p)
         _distance_to(parts, c, p, a, b, normal)
@@ -130,9 +131,13 @@ def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
     facing = nx * best_normal[0] + ny * best_normal[1] + nz * best_normal[2]
     if best > REACH or (facing > FACING * size if core == 0.0 else facing < -FACING * size):
         return count
-    if field.around.shape[0] > 0:
-        for s in range(4):
-            _at(x, faces, q, float(s & 1), float(s >> 1), p)
+    if core == 0.0:
+        for way in range(4):
+            first, second = faces[q, way], faces[q, (way + 1) % 4]
+            if field.row[first] < 0 and field.row[second] < 0:
+                continue
+            su, sv = u if way % 2 == 0 else (1.0 if way == 1 else 0.0), v if way % 2 == 1 else 0.5 * way
+            _at(x, faces, q, su, sv, p)
             if _distance_to(parts, c, p, a, b, normal) < best + BULGE:
                 if parts.still[c]:
                     return count
@@ -152,28 +157,56 @@ def _note(work: Solve, c: int, q: int, depth: float, u: float, v: float, normal:
 
 
 @inlined
-def _search_node(field: Field, parts: Parts, work: Solve, c: int, q: int, count: int) -> int:
-    """Add a node that is met like a face, if part ``c`` is near and before the faces around it."""
+def _search_site(field: Field, parts: Parts, work: Solve, c: int, q: int, count: int) -> int:
+    """Add the deepest point of an edge, or a node, if part ``c`` is near it and before the faces around it."""
     x, faces, vectors = field.x, field.faces, work.vectors
-    p, a, b, normal = vectors[0], vectors[1], vectors[2], vectors[3]
-    node = faces[q, 0]
-    for m in range(3):
-        p[m] = x[node, m]
-    depth = _distance_to(parts, c, p, a, b, normal)
-    if depth > REACH:
+    p, a, b, normal, best_normal = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
+    i, j = faces[q, 0], faces[q, 1]
+    edge = math.sqrt((x[j, 0] - x[i, 0]) ** 2 + (x[j, 1] - x[i, 1]) ** 2 + (x[j, 2] - x[i, 2]) ** 2)
+    best, u, step = math.inf, 0.0, 0.5 / COARSE
+    for s in range(COARSE if i != j else 1):
+        su = (s + 0.5) / COARSE if i != j else 0.0
+        _at(x, faces, q, su, 0.0, p)
+        d = _distance_to(parts, c, p, a, b, normal)
+        if d < best:
+            best, u = d, su
+            best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
+    if best > REACH + edge / COARSE:
+        return count
+    while step * edge > FINE:
+        moved = False
+        for way in range(2):
+            su = min(max(u + (step if way == 0 else -step), 0.0), 1.0)
+            _at(x, faces, q, su, 0.0, p)
+            d = _distance_to(parts, c, p, a, b, normal)
+            if d < best - LEVEL:
+                best, u, moved = d, su, True
+                best_normal[0], best_normal[1], best_normal[2] = normal[0], normal[1], normal[2]
+        if not moved:
+            step *= 0.5
+    if best > REACH:
         return count
     nx, ny, nz = 0.0, 0.0, 0.0
     beside = field.around[q - faces.shape[0] + field.around.shape[0]]
     for s in range(beside.shape[0]):
         if beside[s] >= 0:
-            i, j, k, h = faces[beside[s], 0], faces[beside[s], 1], faces[beside[s], 2], faces[beside[s], 3]
-            for m in range(3):
-                a[m], b[m] = x[k, m] - x[i, m], x[h, m] - x[j, m]
+            k, m, n, h = faces[beside[s], 0], faces[beside[s], 1], faces[beside[s], 2], faces[beside[s], 3]
+            for e in range(3):
+                a[e], b[e] = x[n, e] - x[k, e], x[h, e] - x[m, e]
             nx, ny, nz = nx + a[1] * b[2] - a[2] * b[1], ny + a[2] * b[0] - a[0] * b[2], nz + a[0] * b[1] - a[1] * b[0]
-    facing = nx * normal[0] + ny * normal[1] + nz * normal[2]
+    facing = nx * best_normal[0] + ny * best_normal[1] + nz * best_normal[2]
     if facing > FACING * math.sqrt(nx * nx + ny * ny + nz * nz):
         return count
-    return _note(work, c, q, depth, 0.0, 0.0, normal, count)
+    for end in range(2 if i != j else 0):
+        node = faces[q, end]
+        if field.row[node] >= 0:
+            p[0], p[1], p[2] = x[node, 0], x[node, 1], x[node, 2]
+            if _distance_to(parts, c, p, a, b, normal) < best + BULGE:
+                if parts.still[c]:
+                    return count
+                best = KEEP
+                break
+    return _note(work, c, q, best, u, 0.0, best_normal, count)
 
 
 @kernel
@@ -221,7 +254,10 @@ def _find(field: Field, parts: Parts, work: Solve, still: bool, count: int) -> i
                 beside = box[0, 0] > hx or box[1, 0] < lx or box[0, 1] > hy or box[1, 1] < ly
                 if beside or box[0, 2] > hz or box[1, 2] < lz or count == work.found.shape[0]:
                     continue
-                count = _search_face(field, parts, work, c, q, count)
+                if q < field.faces.shape[0] - field.around.shape[0]:
+                    count = _search_face(field, parts, work, c, q, count)
+                else:
+                    count = _search_site(field, parts, work, c, q, count)
     return count
 
 

@@ -166,13 +166,13 @@ def _field(elastic: ElasticGrid, ticks: int) -> Field:
     for row, m in zip(material, elastic.materials, strict=True):
         row[FRICTION], row[STRENGTH], row[SHEAR] = m.friction, m.strength, m.shear
         row[PUNCTURE], row[CUTTING], row[EXIT] = m.puncture_force, m.cutting_force, m.exit_force
-    nodes, around = _sites(grid.faces) if elastic.floats else (np.zeros(0, np.int64), np.zeros((0, 8), np.int64))
-    faces = np.vstack([grid.faces, np.repeat(nodes[:, None], 4, axis=1)])
+    sites, around = _sites(grid.faces, elastic.row)
+    faces = np.vstack([grid.faces, sites])
     face_cell = np.concatenate([grid.face_cell, grid.face_cell[around[:, 0]]])
     cells, layers, faces, face_cell = (
         np.ascontiguousarray(a, dtype=np.int64) for a in (grid.cells, grid.layer, faces, face_cell)
     )
-    core = np.concatenate([_core(elastic), np.zeros(len(nodes))])
+    core = np.concatenate([_core(elastic), np.zeros(len(sites))])
     return Field(
         elastic.x, elastic.force, cells, layers, faces, face_cell, around, core, np.zeros((len(faces), 2, 3)),
         np.zeros((-(-len(faces) // GROUP), 2, 3)), np.zeros((2, 3)), elastic.free, elastic.row, elastic.responses,
@@ -182,16 +182,27 @@ def _field(elastic: ElasticGrid, ticks: int) -> Field:
     )  # fmt: skip
 
 
-def _sites(faces: Integers) -> tuple[Integers, Integers]:
-    """Nodes of the surface (k,), and the faces around each, (k, 8), -1 for none."""
-    corners = faces.reshape(-1)
-    order = np.argsort(corners, kind="stable")
-    nodes, first, count = np.unique(corners[order], return_index=True, return_counts=True)
-    rank = np.arange(len(corners)) - np.repeat(first, count)
-    around = np.full((len(nodes), 8), -1)
+def _sites(faces: Integers, row: Integers) -> tuple[Integers, Integers]:
+    """Edges i, j, j, i and nodes i, i, i, i (k, 4) of the surface that move, and the faces around each, (k, 8), or -1.
+
+    Nodes of a ``row`` below 0 are held.
+    """
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    found = [_shared(corners) for corners in (ends, np.repeat(faces.reshape(-1, 1), 2, axis=1))]
+    ends, around = (np.concatenate(both) for both in zip(*found, strict=True))
+    moves = (row[ends] >= 0).any(axis=1)
+    return ends[moves][:, [0, 1, 1, 0]], around[moves]
+
+
+def _shared(ends: Integers) -> tuple[Integers, Integers]:
+    """Of four pairs of nodes a face, (4 f, 2): each pair once, and the first 8 faces that have it, or -1."""
+    pairs, place, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(place.reshape(-1), kind="stable")
+    rank = np.arange(len(ends)) - np.repeat(np.cumsum(count) - count, count)
+    around = np.full((len(pairs), 8), -1)
     kept = rank < 8
-    around[np.repeat(np.arange(len(nodes)), count)[kept], rank[kept]] = order[kept] // 4
-    return nodes, around
+    around[np.repeat(np.arange(len(pairs)), count)[kept], rank[kept]] = order[kept] // 4
+    return pairs, around
 
 
 def _core(elastic: ElasticGrid) -> Array:

@@ -16,7 +16,7 @@ from ligature.tables import opener
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-MOST_POINTS = 160
+MOST_POINTS = 320
 """Most points of contact of a block at one time."""
 
 MOST_PATHS, MOST_NODES = 16, 32
@@ -49,9 +49,9 @@ class Field(NamedTuple):
     force: Array  # (n, 3) that moves the nodes in this step, besides those on the points, N
     cells: Integers  # (m, 8)
     layer: Integers  # (m,)
-    faces: Integers  # (q, 4) the faces, and after them nodes that are met like faces, each four times
+    faces: Integers  # (q, 4) the faces, and after them the edges i, j, j, i and nodes i, i, i, i that move
     face_cell: Integers  # (q,)
-    around: Integers  # (k, 8) the faces around each of these k nodes, -1 for none; k = 0 for tissue that is held
+    around: Integers  # (k, 8) the faces around each of these k edges and nodes, -1 for none
     core: Array  # (q,) distance of a held face, m, within which nothing presses the tissue; 0 for faces that move
     face_box: Array  # (q, 2, 3) around the faces at the start of the step, and what is so near
     group_box: Array  # (ceil(q / GROUP), 2, 3) around faces that follow each other
