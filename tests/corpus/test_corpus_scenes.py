@@ -41,6 +41,8 @@ def test_only_the_floor_whose_mesh_is_absent_is_missing(scene: Scene) -> None:
 def test_needle_and_phantom_collide_as_hulls_by_material(scene: Scene) -> None:
     count = {b.identity.key: len(b.colliders) for b in scene.bodies}
     assert count["BODY Needle"] == 9 and count["BODY Phantom"] == 11
+    (needle,) = scene.needles
+    assert scene.bodies[needle.body].identity.name == "Needle" and needle.arc.length == pytest.approx(0.0225, rel=0.01)
 
 
 def test_inertias_are_those_that_the_reference_publishes(scene: Scene, golden: Path) -> None:

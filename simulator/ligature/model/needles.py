@@ -1,6 +1,8 @@
-"""Recognises needles: free bodies whose collision shapes line up along an arc; metres, inertial frame I.
+"""Recognises needles: free bodies whose collision shapes are a thin wire along an arc; metres, inertial frame I.
 
-``ligature needle: false`` on a body keeps it from being one.
+All of the shapes must lie close around the arc, and all of the arc must lie in the shapes. The arc must leave its
+chord by more than the shapes leave the arc: a convex body has its chord inside, so that none is a needle.
+``ligature needle: false`` on a body keeps it from being one; ``true`` asks for a finding where it is none.
 """
 
 from __future__ import annotations
@@ -16,11 +18,21 @@ from ligature.model.frames import inverse
 from ligature.model.piercing import Arc, Needle
 from ligature.model.scene import Articulation, Body, Joint, RodChain
 from ligature.model.shapes import Box, Capsule, Collider, Cone, Cylinder, Hull, Shape, Sphere, TriMesh
+from ligature.model.solids import surface_of
 
 Array = NDArray[np.float64]
 
-SLENDER = 5.0
+SLENDER = 10.0
 """Least length of a needle over the greatest distance of its shapes from its centre line."""
+
+BENT = 2.0
+"""Least distance of the middle of an arc from its chord over the distance of the shapes from the arc."""
+
+GAPS = 50.0
+"""Length of a needle over the greatest gap of its shapes along the centre line, from there to the next shape."""
+
+ALONG, FINEST = 40, 16
+"""Points of the centre line that are looked at; most parts of an edge of the surface between points that are."""
 
 FIT_STEPS = 5
 """Newton steps of a fit; the first guess is off by tenths of a millimetre where the needle is thick."""
@@ -38,7 +50,7 @@ def fit_arc(points: Array) -> Arc:
         raise ValueError("an arc needs three points")
     middle = points.mean(axis=0)
     _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
-    if spread[1] < 1e-6 * spread[0]:
+    if not spread[1] > 1e-6 * spread[0]:
         raise ValueError("an arc needs three points that are not on one line")
     flat = (points - middle) @ axes[:2].T
     u, v, radius = _circle(flat)
@@ -71,23 +83,32 @@ def find_needles(
     bodies: Sequence[Body], joints: Sequence[Joint], forest: Sequence[Articulation], rods: Sequence[RodChain]
 ) -> tuple[tuple[Needle, ...], list[Diagnostic]]:
     """The needles among the bodies that no joint but a thread's holds, and a finding that names each."""
-    alone = [tree.links[0].body for tree in forest if len(tree.links) == 1]
+    alone = {tree.links[0].body for tree in forest if len(tree.links) == 1}
     anchors = [joints[j] for rod in rods for j in rod.anchors]
-    found = []
-    for index in alone:
-        body = bodies[index]
-        if body.static or body.needle is False or not body.colliders:
+    found, findings = [], []
+    for index, body in enumerate(bodies):
+        tails = [_tail(joint, index) for joint in anchors if index in (joint.parent, joint.child)]
+        try:
+            arc = _centre_line(body, index in alone, tails)
+        except ValueError as error:
+            if body.needle:
+                findings.append(_no_needle(body, str(error)))
             continue
-        arc = _centre_line(body, [_tail(joint, index) for joint in anchors if index in (joint.parent, joint.child)])
-        if arc is not None:
-            found.append(Needle(index, arc))
-    return tuple(found), [_finding(needle, bodies[needle.body]) for needle in found]
+        found.append(Needle(index, arc))
+        findings.append(_finding(arc, body))
+    return tuple(found), findings
 
 
-def _finding(needle: Needle, body: Body) -> Diagnostic:
-    size = f"{1e3 * needle.arc.length:.1f} mm long, radius {1e3 * needle.arc.radius:.1f} mm"
+def _finding(arc: Arc, body: Body) -> Diagnostic:
+    size = f"{1e3 * arc.length:.1f} mm long, radius {1e3 * arc.radius:.1f} mm"
     message, hint = f"'{body.identity.identifier}' is a needle, {size}", "opt out with 'ligature needle: false'"
     return Diagnostic(Severity.INFO, message, body.identity.mark, hint, "needle")
+
+
+def _no_needle(body: Body, reason: str) -> Diagnostic:
+    message = f"'{body.identity.identifier}' is to be a needle, but is none: {reason}"
+    hint = "what is recognised: docs/your_scene.md"
+    return Diagnostic(Severity.WARNING, message, body.identity.mark, hint, "needle")
 
 
 def _tail(joint: Joint, body: int) -> Array:
@@ -95,22 +116,76 @@ def _tail(joint: Joint, body: int) -> Array:
     return np.asarray((joint.T_parent_a if joint.parent == body else joint.T_child_b)[:3, 3])
 
 
-def _centre_line(body: Body, tails: list[Array]) -> Arc | None:
-    """The arc of a body's shapes, tip away from its thread; None for a body that is no needle."""
+def _centre_line(body: Body, free: bool, tails: list[Array]) -> Arc:
+    """The arc of a body's shapes, tip away from its thread; raises ValueError with why a body is no needle."""
+    if body.needle is False or not body.colliders:
+        raise ValueError("it opted out" if body.colliders else "it has no collision shape")
+    if body.static or not free:
+        raise ValueError("its mass is 0" if body.static else "a joint holds it")
     T = inverse(body.T_body_inertial)
-    points = np.vstack([_outline(part) for part in body.colliders]) @ T[:3, :3].T + T[:3, 3]
-    try:
-        arc = fit_arc(points)
-    except ValueError:
-        return None
-    offsets = points - arc.centre
-    across = np.hypot(offsets @ arc.x, offsets @ arc.y) - arc.radius
-    thickness = np.hypot(across, offsets @ np.cross(arc.x, arc.y)).max()
-    if arc.length < SLENDER * thickness or arc.length > LONGEST or arc.end - arc.begin > WIDEST_TURN:
-        return None
+    arc = fit_arc(np.vstack([_outline(part) for part in body.colliders]) @ T[:3, :3].T + T[:3, 3])
+    _check_size(arc)
+    surfaces = [surface_of(part) for part in body.colliders]
+    _check_shapes(arc, [(v @ T[:3, :3].T + T[:3, 3])[f] for v, f in filter(None, surfaces)])
     if tails and np.linalg.norm(tails[0] - arc.point(0.0)) < np.linalg.norm(tails[0] - arc.point(arc.length)):
         return Arc(arc.centre, arc.x, -arc.y, arc.radius, -arc.end, -arc.begin)
     return arc
+
+
+def _check_size(arc: Arc) -> None:
+    if arc.length > LONGEST:
+        raise ValueError(f"it is {1e3 * arc.length:.0f} mm long, more than {1e3 * LONGEST:.0f} mm")
+    turn = arc.end - arc.begin
+    if turn > WIDEST_TURN:
+        raise ValueError(f"it turns by {np.degrees(turn):.0f} degrees, more than {np.degrees(WIDEST_TURN):.0f}")
+
+
+def _check_shapes(arc: Arc, surfaces: list[Array]) -> None:
+    """Raise ValueError unless the corners (m, 3, 3) of closed surfaces are a thin wire along the arc."""
+    points = np.vstack([_sampled(corners, arc.length / ALONG) for corners in surfaces])
+    thickness = float(_distances(arc, points).max())
+    size = f"{1e3 * thickness:.2g} mm from an arc of {1e3 * arc.length:.0f} mm"
+    if arc.length < SLENDER * thickness:
+        raise ValueError(f"its shapes reach {size}, too thick")
+    bow = arc.radius * (1.0 - math.cos(0.5 * (arc.end - arc.begin)))
+    if bow < BENT * thickness:
+        raise ValueError(f"its shapes reach {size}, which is bent by {1e3 * bow:.2g} mm only")
+    for depth in np.linspace(0.0, arc.length, ALONG + 1).tolist():
+        place = arc.point(depth)
+        gap = np.sqrt(((points - place) ** 2).sum(axis=1).min())
+        if gap > arc.length / GAPS and not any(_inside(corners, place) for corners in surfaces):
+            raise ValueError(f"its shapes leave a gap along an arc of {1e3 * arc.length:.0f} mm")
+
+
+def _sampled(corners: Array, spacing: float) -> Array:
+    """Points (n, 3) of triangles (m, 3, 3): their corners, and between them where edges are longer than ``spacing``."""
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+    parts = int(np.clip(np.ceil(longest / spacing), 1, FINEST))
+    shares = np.array([(i, j, parts - i - j) for i in range(parts + 1) for j in range(parts + 1 - i)]) / parts
+    return np.asarray((shares @ corners).reshape(-1, 3))
+
+
+def _distances(arc: Arc, points: Array) -> Array:
+    """Distances (n,) of points (n, 3) from an arc."""
+    at = points - arc.centre
+    middle = 0.5 * (arc.begin + arc.end)
+    beyond = (np.arctan2(at @ arc.y, at @ arc.x) - middle + np.pi) % (2.0 * np.pi) - np.pi
+    half = 0.5 * (arc.end - arc.begin)
+    angles = middle + np.clip(beyond, -half, half)
+    nearest = arc.radius * (np.cos(angles)[:, None] * arc.x + np.sin(angles)[:, None] * arc.y)
+    return np.asarray(np.linalg.norm(at - nearest, axis=1))
+
+
+def _inside(corners: Array, place: Array) -> bool:
+    """Whether a place (3,) is in a closed surface: the solid angle of its triangles (m, 3, 3) there is that of a ball.
+
+    Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983, 125.
+    """
+    a, b, c = np.moveaxis(corners - place, 1, 0)
+    x, y, z = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(axis=1)
+    rest = x * y * z + (a * b).sum(axis=1) * z + (b * c).sum(axis=1) * x + (c * a).sum(axis=1) * y
+    return bool(abs(np.arctan2(volume, rest).sum()) > np.pi)
 
 
 def _outline(part: Collider) -> Array:

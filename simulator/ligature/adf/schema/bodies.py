@@ -143,7 +143,7 @@ BODY = (
     *ignored(("resistive surface", "resistive surface1"), "of AMBF 1.0; sensors of type Resistance replaced it"),
     *ignored(("enable feedback",), "belongs to joints"),
     ROD,
-    Key("ligature needle", F, doc="false: not a needle; by default needles are recognised", status=Status.OURS),
+    Key("ligature needle", F, doc="false: not a needle; true: a warning where it is none", status=Status.OURS),
     *SOFT_TISSUE,
 )
 
