@@ -275,3 +275,21 @@ def test_a_sensor_has_only_so_many_rays(lab, tmp_path: Path, source: str, beyond
     scene = lab(m=text.replace("{count}", str(256 + beyond)))
     assert [len(sensor.rays) for sensor in scene.sensors] == ([] if beyond else [MOST_RAYS])
     assert (words in reported(scene, Severity.ERROR)) == bool(beyond), reported(scene)
+
+
+@pytest.mark.parametrize(
+    ("keys", "shape"),
+    [
+        ("shape: BOX, geometry: {x: 1, y: 1, z: 1}", "shape"),
+        ("compound shape: [{shape: SPHERE, geometry: {radius: 1}}]", "compound shape"),
+        ("shape: BOX, geometry: {x: 1, y: 1, z: 1}, collision shape: SPHERE, collision geometry: {radius: 1}", ""),
+        ("shape: BOX, geometry: {x: 1, y: 1, z: 1}, ligature tissue: {youngs modulus: 1.0e+9, cell size: 0.3}", ""),
+        ("friction: {static: 0.5}", ""),
+    ],
+)
+def test_a_body_that_is_drawn_but_collides_with_nothing_is_noted(tmp_path: Path, keys: str, shape: str) -> None:
+    (tmp_path / "m.yaml").write_text(f"bodies: [B]\nB: {{name: b, mass: 1, {keys}}}\n")
+    found = [d for d in ligature.load(tmp_path / "m.yaml").diagnostics if "collides with nothing" in d.message]
+    assert [(d.severity, f"'{shape}'" in d.message, bool(d.hint)) for d in found] == [
+        (Severity.INFO, True, True)
+    ] * bool(shape)

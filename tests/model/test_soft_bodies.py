@@ -164,6 +164,7 @@ def test_many_fixed_nodes_hold_the_grid(tmp_path: Path) -> None:
         (trimesh.creation.box((0.1, 0.1, 0.1)).slice_plane([0, 0, 0], [0, 0, 1]), "kLST: 0.1", 0.2,
          "is cloth: 'lump.obj' has"),
         (ball(), "kLST: 0.1", 0.0, "has a mass of 0 kg"),
+        (ball(), "kLST: 0.1", -1.0, "has a mass of -1 kg"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_simulated_is_refused_with_a_reason(
@@ -171,6 +172,15 @@ def test_what_cannot_be_simulated_is_refused_with_a_reason(
 ) -> None:
     found = [d for d in findings(write(tmp_path, mesh, config, mass), (), False) if d.severity >= Severity.ERROR]
     assert any(message in d.message and d.hint for d in found), found
+
+
+@pytest.mark.parametrize("key", ["kLST", "kMT", "kDP"])
+@pytest.mark.parametrize(("value", "taken"), [(1.5, 1), (-1.0, 0), (-0.5, 0), (2.0, 1), (1.0, None), (0.0, None)])
+def test_a_share_beyond_0_and_1_is_reported(tmp_path: Path, key: str, value: float, taken: float | None) -> None:
+    found = findings(write(tmp_path, ball(), f"{key}: {value}"), (), False)
+    messages = [d.message for d in found if d.severity >= Severity.WARNING]
+    expected = [] if taken is None else [f"soft body 'BODY Lump' has the {key} {value:g}; {taken:g} is taken"]
+    assert messages == expected
 
 
 def test_a_node_that_does_not_exist_ends_the_list(tmp_path: Path) -> None:

@@ -145,6 +145,17 @@ def test_tissue_is_fixed_to_the_body_that_carries_it(tmp_path: Path) -> None:
         ),
         (LINE, LINE + "    slits: [{from: {x: -1, y: -1, z: 0}, to: {x: 1, y: 1, z: 0}}]\n", "are not held"),
         (LINE, LINE + "    layers: [{material: fat}, {material: skin}]\n", "layer without thickness"),
+        (
+            "    material: silicone pad\n",
+            "    layers: [{thickness: 0.004, material: fat}, {density: 900}]\n",
+            "in layer 2",
+        ),
+        (LINE, LINE + "    fixed:\n", "has no value for 'fixed'"),
+        (
+            LINE,
+            LINE + "    slits: [{from: {x: -1, y: -1, z: -1}, to: {x: 1, y: 1, z: 1}}]\n",
+            "its slits leave no cell",
+        ),
         (LINE, LINE + "    layers: [{thickness: 0, material: fat}, {material: skin}]\n", "layer without thickness"),
         (
             LINE,
@@ -242,6 +253,38 @@ def test_an_open_mesh_is_reported(tmp_path: Path) -> None:
     text = PAD.replace("shape: BOX\n  geometry: {x: 0.06, y: 0.04, z: 0.01}", "mesh: open.obj", 1)
     found = load(tmp_path, text).diagnostics
     assert any("open edges" in d.message and d.severity.name == "ERROR" for d in found)
+
+
+@given(
+    st.tuples(*[st.floats(0.01, 0.1)] * 3), st.sampled_from([1.0, -1.0, 0.5, -2.0]), st.booleans(),
+    st.sampled_from(["box", "icosphere", "torus"]),
+)  # fmt: skip
+@settings(max_examples=20)
+def test_a_mirrored_or_inverted_mesh_is_filled_as_any_other(
+    tmp_path_factory: pytest.TempPathFactory, size: tuple[float, ...], scale: float, inverted: bool, shape: str
+) -> None:
+    folder = tmp_path_factory.mktemp("m")
+    mesh = getattr(trimesh.creation, shape)(*((0.4, 0.2) if shape == "torus" else ()))
+    mesh.apply_scale(size)
+    whole = abs(mesh.volume) * abs(scale) ** 3
+    mesh.faces = mesh.faces[:, ::-1] if inverted else mesh.faces
+    (folder / "pad.obj").write_text(trimesh.exchange.obj.export_obj(mesh))
+    text = PAD.replace("shape: BOX\n  geometry: {x: 0.06, y: 0.04, z: 0.01}", f"mesh: pad.obj\n  scale: {scale}", 1)
+    (tissue,) = load(folder, text.replace(LINE, "")).tissues
+    assert tissue.form.grid.sizes.prod(axis=1).sum() == pytest.approx(whole, rel=0.3)
+
+
+def test_a_mesh_scaled_to_nothing_is_reported_as_that(tmp_path: Path) -> None:
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "pad.obj")
+    text = PAD.replace("shape: BOX\n  geometry: {x: 0.06, y: 0.04, z: 0.01}", "mesh: pad.obj\n  scale: 0", 1)
+    (error,) = [d for d in load(tmp_path, text).diagnostics if d.severity.name == "ERROR"]
+    assert "has no extent" in error.message and "'scale'" in error.hint
+
+
+def test_layers_that_all_have_a_material_need_none_of_the_body(tmp_path: Path) -> None:
+    layers = "    layers: [{thickness: 0.004, material: fat}, {youngs modulus: 1.0e+4, density: 900}]\n"
+    form = load(tmp_path, PAD.replace("    material: silicone pad\n", layers)).tissues[0].form
+    assert [m.youngs for m in form.materials] == [MATERIALS["fat"].youngs, 1e4] and form.own_density
 
 
 @pytest.mark.parametrize("shape", ["SPHERE", "CYLINDER", "CAPSULE", "CONE"])

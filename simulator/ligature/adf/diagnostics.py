@@ -14,6 +14,14 @@ def length(metres: float, digits: int = 3) -> str:
     return f"{metres:.{digits}g} m" if "e+" in millimetres else f"{millimetres} mm"
 
 
+def span(low: Iterable[float], high: Iterable[float]) -> str:
+    """Two places, in the unit that suits a message: ``"from (0, 0, 1) to (20, 5.5, 3) mm"``."""
+    one, other = list(low), list(high)
+    far = max(abs(x) for x in (*one, *other)) >= 1.0
+    first, last = (", ".join(f"{x if far else 1e3 * x:.3g}" for x in place) for place in (one, other))
+    return f"from ({first}) to ({last}) {'m' if far else 'mm'}"
+
+
 class Severity(enum.IntEnum):
     """How much a finding matters; only errors make `ligature check` fail."""
 

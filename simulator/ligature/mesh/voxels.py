@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ligature.adf.diagnostics import length, span
 from ligature.mesh.grid import Cut, Grid, build_grid
 from ligature.mesh.surface import open_edges, weld
 
@@ -29,6 +30,14 @@ CHUNK = 256
 
 SAMPLES = 4
 """Points along each edge of a cell at which its filling is counted."""
+
+
+class NoTissueError(ValueError):
+    """A shape that cannot be filled with cells: what is wrong, and ``hint``, what would be right."""
+
+    def __init__(self, message: str, hint: str) -> None:
+        super().__init__(f"{message}; {hint}")
+        self.message, self.hint = message, hint
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +90,9 @@ def voxelise(
 
     Raises
     ------
-    ValueError
-        When the mesh is not closed, the cells are so large that none is filled, or a slit lies outside.
+    NoTissueError
+        When the mesh is not closed, the cells are so large that none is filled, a slit lies outside, or slits leave
+        nothing.
     """
     axes, filled, found = lattice(vertices, triangles, cell, slits, planes)
     grid = build_grid(axes, filled, cuts=[*cuts, *found], closing=(0, 1, 2) if slits else (0, 1))
@@ -98,23 +108,27 @@ def lattice(
 ) -> tuple[list[Array], NDArray[np.bool_], list[Cut]]:
     """The lattice of `voxelise`: its planes along x, y, z (m), which cells are tissue (nx, ny, nz), the slits' cuts.
 
-    NumPy alone does it, so that Blender, which lacks SciPy, can show the cells. Raises ValueError like `voxelise`.
+    NumPy alone does it, so that Blender, which lacks SciPy, can show the cells. Raises `NoTissueError` as `voxelise`.
     """
-    welded, faces = weld(np.asarray(vertices, dtype=np.float64), np.asarray(triangles, dtype=np.int32))
-    if not len(faces) or open_edges(faces):
-        raise ValueError("the mesh has open edges, so it encloses no tissue; close it or give it a thickness")
+    welded, faces = _outward(vertices, triangles)
     low, high = welded.min(axis=0), welded.max(axis=0)
     edge = np.broadcast_to(np.asarray(cell, dtype=np.float64), 3)
     wanted = [[*planes[a], *(float(x) for box in slits for x in box[:, a])] for a in range(3)]
     axes = [_lattice(low[a], high[a], edge[a], wanted[a]) for a in range(3)]
     filled = _filling(welded[faces], axes) >= FULL
+    if not filled.any():
+        size, cells = " x ".join(length(x) for x in high - low), " x ".join(dict.fromkeys(length(x) for x in edge))
+        raise NoTissueError(f"its shape of {size} fills no cell of {cells} to a half", "use smaller cells")
     cuts: list[Cut] = []
     for box in slits:
         flat = np.flatnonzero(box[0] == box[1])
         inside = [(a[:-1] + np.diff(a) / 2 > lo) & (a[:-1] + np.diff(a) / 2 < hi)
                   for a, lo, hi in zip(axes, box.min(axis=0), box.max(axis=0), strict=True)]  # fmt: skip
         if len(flat) > 1 or (len(flat) and not low[flat[0]] < box[0, flat[0]] < high[flat[0]]):
-            raise ValueError(f"the slit from {box[0]} to {box[1]} m is not a rectangle or box inside the mesh")
+            raise NoTissueError(
+                f"the slit {span(*box)} is not a rectangle or box inside the mesh",
+                f"the mesh reaches {span(low, high)}; only a slit that is flat along one axis, within it, is one",
+            )
         if len(flat):
             axis = int(flat[0])
             index = int(np.argmin(np.abs(axes[axis] - box[0, axis])))
@@ -122,8 +136,25 @@ def lattice(
         else:
             filled &= ~(inside[0][:, None, None] & inside[1][:, None] & inside[2])
     if not filled.any():
-        raise ValueError(f"no cell of {cell} m is filled by the mesh of {high - low} m; use smaller cells")
+        raise NoTissueError("its slits leave no cell", f"use smaller ones; the mesh reaches {span(low, high)}")
     return axes, filled, cuts
+
+
+def _outward(vertices: Array, triangles: NDArray[np.integer]) -> tuple[Array, NDArray[np.int32]]:
+    """A closed surface, welded, with faces that look outwards; raises `NoTissueError` for another one."""
+    welded, faces = weld(np.asarray(vertices, dtype=np.float64), np.asarray(triangles, dtype=np.int32))
+    if len(welded) < 2 or not len(faces):
+        raise NoTissueError("the mesh has no extent", "give a closed mesh, and a 'scale' that is not 0")
+    if open_edges(faces):
+        raise NoTissueError("the mesh has open edges, so it encloses no tissue", "close it or give it a thickness")
+    # A mirrored mesh, as by a negative scale, looks inwards.
+    return welded, faces if volume(welded, faces) > 0.0 else faces[:, ::-1]
+
+
+def volume(vertices: Array, faces: NDArray[np.integer]) -> float:
+    """Volume in a closed surface, negative where its faces look inwards."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
 
 def usual_cell(vertices: Array, held: bool) -> float:

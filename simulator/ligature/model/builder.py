@@ -40,6 +40,7 @@ from ligature.model.scene import (
 )
 from ligature.model.sutures import thread
 
+LEFT_OUT = "is left out"
 KINDS = ("body", "joint", "ghost", "sensor", "actuator", "camera", "light")
 
 
@@ -340,7 +341,8 @@ class SceneBuilder:
             child = made.pop(element.key, None)
             if child is None or not element.text(key):
                 continue
-            parent = self._body(element, key, local, merged(model.namespace, element.text("namespace")))
+            space = merged(model.namespace, element.text("namespace"))
+            parent = self._body(element, key, local, space, fate="is carried by nothing")
             if parent is None:
                 continue
             carrier, tissue = self.bodies[parent], self.bodies[child]
@@ -360,10 +362,13 @@ class SceneBuilder:
                 self._names["joint"].identifiers.append(identity.identifier)
                 self.linked.append((parent, child))
 
-    def _body(self, element: Element, key: str, local: list[int], namespace: str, remap: str = "") -> int | None:
+    def _body(
+        self, element: Element, key: str, local: list[int], namespace: str, remap: str = "", fate: str = LEFT_OUT
+    ) -> int | None:
         """The body that ``element`` names under ``key``, looked for in AMBF's order.
 
         ``remap`` is the element's own suffix; of bodies that earlier files have several times, it means that with it.
+        ``fate`` is what becomes of the element without that body.
         """
         text = element.text(key)
         names = [body.identity.identifier for body in self.bodies]
@@ -377,10 +382,11 @@ class SceneBuilder:
             if len(found) == 1:
                 return local[found[0]] if within else found[0]
             ambiguous += [pool[i] for i in found]
-        if not ambiguous and self.lost.took_along(f"{element.kind} '{element.key}'", (text, namespace + text)):
+        dependant = f"{element.kind} '{element.key}'" if fate == LEFT_OUT else f"'{key}' of '{element.key}'"
+        if not ambiguous and self.lost.took_along(dependant, (text, namespace + text)):
             return None
         reason = f"is ambiguous ({', '.join(ambiguous[:3])}, …)" if ambiguous else "does not exist"
-        message = f"{element.kind} '{element.key}' is left out: its {key} '{text}' {reason}"
+        message = f"{element.kind} '{element.key}' {fate}: its {key} '{text}' {reason}"
         self.report(
             Diagnostic(
                 Severity.ERROR,

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from ligature.adf import Diagnostic, Element, Severity
+from ligature.model.doubts import doubts
 from ligature.model.extents import estimated_inertial, estimated_moments
 from ligature.model.frames import Array, pose_matrix
 from ligature.model.geometry import FileContext, colliders, collision_margin, visual
@@ -51,17 +52,23 @@ def body_of(element: Element, context: FileContext, gravity: Array, shaders: Sha
     else:
         if not has_mass:
             _warn_no_mass(element, context)
+        if not shapes:
+            _note_no_collision(element, context)
         mass = element.number("mass")
         T_body_inertial = estimated_inertial(shapes) if offset is None else offset
         inertia = estimated_moments(shapes, T_body_inertial, margin, mass) if moments is None else moments
-    own_gravity = has_mass and element.has("gravity")
+    place = pose_matrix(*element.pose("location"))
+    if has_mass and element.has("gravity"):
+        gravity = np.array(element.vector("gravity"))
+    for doubt in [] if tissue is None else doubts(element, tissue, mass, place[:3, :3], gravity):
+        context.report(doubt)
     return partial(
         Body,
         mass=mass,
         inertia=inertia,
         T_body_inertial=T_body_inertial,
-        T_world_body=pose_matrix(*element.pose("location")),
-        gravity=np.array(element.vector("gravity")) if own_gravity else gravity,
+        T_world_body=place,
+        gravity=gravity,
         colliders=shapes,
         visual=looks,
         collision_margin=margin,
@@ -97,6 +104,15 @@ def _warn_no_mass(element: Element, context: FileContext) -> None:
     rest = f", and its {', '.join(ignored)} has no effect" if ignored else ""
     message = f"body '{element.key}' has no 'mass'; using 1 kg{rest}"
     context.report(Diagnostic(severity, message, element.mark, "add mass: kilograms; 0 makes it static", "mass"))
+
+
+def _note_no_collision(element: Element, context: FileContext) -> None:
+    """Report a body that is drawn by a primitive alone: of a mesh, collision shapes are made."""
+    key = next((key for key in ("shape", "compound shape") if element.has(key)), None)
+    if key is not None:
+        message = f"body '{element.key}' collides with nothing: it has a '{key}' but no 'collision shape'"
+        hint = "add 'collision shape' and 'collision geometry'" if key == "shape" else "add 'compound collision shape'"
+        context.report(Diagnostic(Severity.INFO, message, element.mark_of(key), hint, "geometry"))
 
 
 def controller_of(element: Element, key: str, otherwise: CartesianController) -> CartesianController:

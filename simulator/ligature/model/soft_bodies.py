@@ -27,6 +27,8 @@ from ligature.adf import Diagnostic, Element, Severity
 from ligature.adf.diagnostics import AdfError
 from ligature.mesh import load_mesh
 from ligature.mesh.surface import joined, open_edges
+from ligature.mesh.voxels import volume
+from ligature.model.doubts import doubts
 from ligature.model.frames import Array, pose_matrix
 from ligature.model.geometry import FileContext, GeometryError, collision_mesh, visual
 from ligature.model.material import TissueMaterial
@@ -50,6 +52,9 @@ GRAVITY = 9.8
 POISSON, POISSON_OF_VOLUME = 0.3, 0.45
 """Poisson's ratio of a network of springs, and where ``kVC`` or ``kPR`` keeps the volume."""
 
+SHARES = ("kLST", "kMT", "kDP")
+"""Keys of ``config`` from 0 to 1."""
+
 MOST_PINS = 24
 """Fixed nodes up to which each is a pin; more hold the grid itself."""
 
@@ -61,6 +66,7 @@ def soft_body_of(
     looks, mass = visual(element, context, shaders), element.number("mass")
     if not mass > 0.0:
         raise _error(element, "mass", f"has a mass of {mass:g} kg", "give kilograms above 0; hold it by 'fixed nodes'")
+    _report_shares(element, context)
     vertices, faces, points = _surface(element, context)
     form = form_of(element, vertices, faces, _material(element, context, vertices, faces, mass)).scaled(mass)
     check_density(element, form)
@@ -70,6 +76,9 @@ def soft_body_of(
     elif len(held):
         form = replace(form, pins=form.embed(held))
     T_body_inertial, inertia = inertial_of(form, mass, None)
+    place = pose_matrix(*element.pose("location"))
+    for doubt in doubts(element, form, mass, place[:3, :3], gravity):
+        context.report(doubt)
     damping = 1.0 - (1.0 - min(max(element.number("config.kDP"), 0.0), 1.0)) ** round(1.0 / STEP)
     friction = element.value("ligature tissue.surface friction")
     return partial(
@@ -77,7 +86,7 @@ def soft_body_of(
         mass=0.0 if form.fixed.any() else mass,
         inertia=inertia,
         T_body_inertial=T_body_inertial,
-        T_world_body=pose_matrix(*element.pose("location")),
+        T_world_body=place,
         gravity=gravity,
         visual=looks,
         friction=element.number("config.kDF") if friction is None else float(friction),
@@ -87,28 +96,32 @@ def soft_body_of(
     )
 
 
+def _report_shares(element: Element, context: FileContext) -> None:
+    """Report the keys beyond 0 and 1, of which the nearer one is taken."""
+    for name in SHARES:
+        value = element.number(f"config.{name}")
+        if not 0.0 <= value <= 1.0:
+            message = f"soft body '{element.key}' has the {name} {value:g}; {min(max(value, 0.0), 1.0):g} is taken"
+            mark = element.mark_of(f"config.{name}")
+            context.report(Diagnostic(Severity.WARNING, message, mark, "give 0 to 1", "tissue"))
+
+
 def stiffness_of(element: Element, vertices: Array, faces: NDArray[np.int32], mass: float) -> float:
     """Young's modulus in Pa that ``config`` amounts to for ``mass`` kilograms in a welded, closed surface."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    area, volume = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()), _volume(vertices, faces)
+    area, inside = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()), volume(vertices, faces)
     unit = mass / len(vertices) / STEP**2
     springs = 0.5 * unit * _hardness(element.number("config.kLST"), element.integer("config.piterations"))
     shape = unit * _hardness(element.number("config.kMT"), 1)
     square = float((vertices - vertices.mean(axis=0)).var(axis=0).mean())
-    young = 2.0 / 3.0 * area / volume * 2.0 / np.sqrt(3.0) * springs + shape * len(vertices) * square / volume
+    young = 2.0 / 3.0 * area / inside * 2.0 / np.sqrt(3.0) * springs + shape * len(vertices) * square / inside
     return float(young)
 
 
 def bounded(young: float, vertices: Array, faces: NDArray[np.int32], mass: float) -> float:
     """Young's modulus that ``mass`` kilograms in a closed surface may have, the nearest to the given one."""
-    column = mass / _volume(vertices, faces) * GRAVITY * float(np.ptp(vertices, axis=0).max())
+    column = mass / volume(vertices, faces) * GRAVITY * float(np.ptp(vertices, axis=0).max())
     return min(max(young, SOFTEST * column), STIFFEST)
-
-
-def _volume(vertices: Array, faces: NDArray[np.int32]) -> float:
-    """Volume in a closed surface, negative where its faces look inwards."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
 
 def _hardness(share: float, times: int) -> float:
@@ -154,7 +167,7 @@ def _surface(element: Element, context: FileContext) -> tuple[Array, NDArray[np.
     if missing:
         what = f"is cloth: '{name}' has {missing} open edges, and open surfaces are not simulated"
         raise _error(element, "mesh", what, "give it a thickness, so that the mesh is closed")
-    if _volume(vertices, faces) < 0.0:
+    if volume(vertices, faces) < 0.0:
         faces = np.ascontiguousarray(faces[:, ::-1])
     scale = element.number("scale")
     points = mesh.vertices if mesh.points is None else mesh.points

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.adf import Diagnostic, Element, Severity
+from ligature.adf.diagnostics import length
 from ligature.mesh import load_mesh
 from ligature.mesh.surface import joined
-from ligature.mesh.voxels import usual_cell, voxelise
+from ligature.mesh.voxels import NoTissueError, usual_cell, voxelise
 from ligature.model.frames import Array, frame
 from ligature.model.geometry import FileContext, GeometryError
 from ligature.model.material import KEYS, MATERIALS, TissueMaterial
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from ligature.model.scene import Body
     from ligature.model.shapes import Collider, Visual
 
+STARTS, DENSE = ("material", "youngs modulus"), ("material", "density")
+"""Keys of which one begins a material, and of which one states its density."""
 FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
 MOST_NODES = 6000
 """Most nodes of a body: with more, a step takes longer than the four ticks that it stands for."""
@@ -47,36 +50,50 @@ def tissue_of(
     """
     if not element.has("ligature tissue"):
         return None
-    base = material_of(element, "ligature tissue.", None)
-    form = form_of(element, *_surface(element, context, visual, colliders), base)
+    form = form_of(element, *_surface(element, context, visual, colliders), _base(element))
     return replace(form, support=element.text("ligature tissue.carried by"))
 
 
-def form_of(element: Element, vertices: Array, faces: NDArray[np.int32], base: TissueMaterial) -> TissueForm:
+def _base(element: Element) -> TissueMaterial | None:
+    """The material of the whole body; None where every layer has its own, and the body none."""
+    layers = element.children("ligature tissue.layers")
+    if layers and not any(element.has(f"ligature tissue.{key}") for key in STARTS):
+        lacking = [n for n, item in enumerate(layers) if not any(item.has(key) for key in STARTS)]
+        if lacking:
+            hint = f"give 'youngs modulus' in Pa, or material: {', '.join(MATERIALS)}; in every layer, or once for all"
+            what = f"has no tissue material, and none in layer {lacking[0] + 1}"
+            raise _error(element, "ligature tissue.layers", what, hint)
+        return None
+    return material_of(element, "ligature tissue.", None)
+
+
+def form_of(element: Element, vertices: Array, faces: NDArray[np.int32], base: TissueMaterial | None) -> TissueForm:
     """The tissue that fills a surface, vertices (n, 3) in B and faces (m, 3); raises `GeometryError`."""
     cell = element.value("ligature tissue.cell size")
     if cell is None:
         cell = usual_cell(vertices, bool(element.texts("ligature tissue.fixed")))
     nodes = np.prod(np.ceil(np.ptp(vertices, axis=0) / cell) + 1.0)
     if nodes > MOST_AROUND * MOST_NODES:
-        raise _error(element, "ligature tissue.cell size", f"lies in a grid of {nodes:.0f} nodes",
-                     f"at most {MOST_NODES} are simulated; use larger cells than {cell:g} m")  # fmt: skip
+        size = " x ".join(length(extent) for extent in np.ptp(vertices, axis=0))
+        raise _error(element, "ligature tissue.cell size", f"lies in a grid of {nodes:.6g} nodes",
+                     f"at most {MOST_NODES} are simulated; use cells above {length(cell)} in {size}")  # fmt: skip
     slits = [np.array([item.vector("from"), item.vector("to")]) for item in element.children("ligature tissue.slits")]
     materials, heights = _layers(element, base, float(vertices[:, 2].max()))
     try:
         grid, _ = voxelise(vertices, faces, cell, slits=slits, planes=((), (), heights))
-    except ValueError as error:
-        raise _error(
-            element, "ligature tissue", f"cannot be tissue: {error}", "give a closed mesh and fitting cells"
-        ) from None
+    except NoTissueError as error:
+        key = "ligature tissue.slits" if "slit" in error.message else "ligature tissue"
+        raise _error(element, key, f"cannot be tissue: {error.message}", error.hint) from None
     middle = grid.nodes[grid.cells].mean(axis=1)[:, 2]
     layer = np.searchsorted(-np.array(heights), -middle).astype(np.int64)
     grid = replace(grid, layer=layer)
     if len(grid.nodes) > MOST_NODES:
         raise _error(element, "ligature tissue.cell size", f"has {len(grid.nodes)} nodes",
-                     f"at most {MOST_NODES} are simulated; use larger cells than {cell:g} m")  # fmt: skip
+                     f"at most {MOST_NODES} are simulated; use larger cells than {length(cell)}")  # fmt: skip
     fixed = _fixed(element, grid)
-    stated = any(element.has(f"ligature tissue.{key}") for key in ("density", "material"))
+    layers = element.children("ligature tissue.layers")
+    stated = any(element.has(f"ligature tissue.{key}") for key in DENSE)
+    stated = stated or (len(layers) > 0 and all(any(item.has(key) for key in DENSE) for item in layers))
     return TissueForm(grid, materials, fixed, own_density=stated, slits=tuple(slits))
 
 
@@ -109,12 +126,18 @@ def tissue_findings(bodies: Iterable[Body]) -> list[Diagnostic]:
     for body in bodies:
         if body.tissue is not None:
             grid = body.tissue.grid
-            edges = " x ".join(f"{1e3 * edge:.2g}" for edge in np.median(grid.sizes, axis=0))
+            edges = _edges(np.median(grid.sizes, axis=0))
             young = " and ".join(dict.fromkeys(f"{m.youngs:.3g}" for m in body.tissue.materials))
-            message = f"'{body.identity.identifier}' is soft tissue: {len(grid.nodes)} nodes, cells of {edges} mm"
+            message = f"'{body.identity.identifier}' is soft tissue: {len(grid.nodes)} nodes, cells of {edges}"
             message += f", Young's modulus {young} Pa"
             findings.append(Diagnostic(Severity.INFO, message, body.identity.mark, "docs/tissue.md", "tissue"))
     return findings
+
+
+def _edges(size: Array) -> str:
+    """Edges (3,) of a cell, in the unit that suits a message."""
+    large = size.max() >= 0.1
+    return " x ".join(f"{edge if large else 1e3 * edge:.2g}" for edge in size) + (" m" if large else " mm")
 
 
 def material_of(element: Element, prefix: str, below: TissueMaterial | None) -> TissueMaterial:
@@ -134,10 +157,13 @@ def material_of(element: Element, prefix: str, below: TissueMaterial | None) -> 
         raise _error(element, prefix + first, f"cannot be tissue: {error}", "see docs/tissue.md") from None
 
 
-def _layers(element: Element, base: TissueMaterial, top: float) -> tuple[tuple[TissueMaterial, ...], list[float]]:
+def _layers(
+    element: Element, base: TissueMaterial | None, top: float
+) -> tuple[tuple[TissueMaterial, ...], list[float]]:
     """Materials from the top down, and the heights in B between them."""
     layers = element.children("ligature tissue.layers")
     if not layers:
+        assert base is not None  # only layers make up for it
         return (base,), []
     materials, heights = [], []
     for number, item in enumerate(layers):
@@ -155,6 +181,9 @@ def _layers(element: Element, base: TissueMaterial, top: float) -> tuple[tuple[T
 def _fixed(element: Element, grid: Grid) -> NDArray[np.bool_]:
     """The nodes of the faces that the file holds, those at the ends of the grid along the axes of B."""
     fixed = np.zeros(len(grid.nodes), dtype=bool)
+    if element.has("ligature tissue.fixed") and element.raw_value("ligature tissue.fixed") is None:
+        raise _error(element, "ligature tissue.fixed", "has no value for 'fixed'",
+                     "give faces such as [-z], or [] for none; remove the key to have its default")  # fmt: skip
     for face in element.texts("ligature tissue.fixed"):
         if face not in FACES:
             raise _error(element, "ligature tissue.fixed", f"has no face '{face}'", f"give faces of {', '.join(FACES)}")
