@@ -64,6 +64,48 @@ def test_inertia_of_a_box_is_its_closed_form(tmp_path: Path) -> None:
     assert "BODY a: mass 6 kg, volume 6 m³, inertia {ix: 6.5, iy: 5, iz: 2.5}" in run("inertia", tmp_path / "m.yaml")
 
 
+@pytest.mark.parametrize(
+    ("shapes", "volume"),
+    [
+        ("shape: BOX, geometry: {x: 0.04, y: 0.03, z: 0.02}", "2.4e-05"),
+        ("compound shape: [{shape: BOX, geometry: {x: 0.04, y: 0.03, z: 0.02}}]", "2.4e-05"),
+        (
+            "shape: BOX, geometry: {x: 0.04, y: 0.03, z: 0.02}, collision shape: SPHERE, collision geometry: {radius: 1}",
+            "2.4e-05",
+        ),
+        ("collision shape: BOX, collision geometry: {x: 0.04, y: 0.03, z: 0.02}", "2.4e-05"),
+        ("friction: {static: 0.5}", "add a 'shape' or a 'mesh'"),
+    ],
+)
+def test_inertia_of_tissue_is_that_of_what_it_fills(tmp_path: Path, shapes: str, volume: str) -> None:
+    text = f"bodies: [P]\nP: {{name: p, mass: 1, {shapes}, ligature tissue: {{material: liver}}}}\n"
+    (tmp_path / "m.yaml").write_text(text)
+    assert volume in run("inertia", tmp_path / "m.yaml")
+
+
+def test_what_no_robot_holds_is_reported(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(
+        "bodies: [A, B, P]\njoints: [J]\nghost objects: [G]\nsutures: [S]\nsoft bodies: [Q, R]\nsensors: [X]\n"
+        "gravity: {x: 0, y: 0, z: -1}\n"
+        "A: {name: a, mass: 1, friction: {static: 0.3}, ligature needle: true, restitution: 0.1}\n"
+        "B: {name: b, mass: 1, friction: {static: 0.3}}\n"
+        "P: {name: p, shape: BOX, geometry: {x: 1, y: 1, z: 1}, ligature tissue: {material: liver}}\n"
+        "J: {name: j, type: revolute, parent: A, child: B, parent pivot: {x: 0, y: 0, z: 0}, child pivot: {x: 0, y: 0, z: 0}, "
+        "parent axis: {x: 0, y: 0, z: 1}, child axis: {x: 0, y: 0, z: 1}, controller: {P: 1, I: 0, D: 0}, damping: 0.3}\n"
+        "G: {name: g, parent: A}\nS: {name: s, length: 0.1, diameter: 0.001}\nQ: {name: q}\nR: {name: r}\n"
+        "X: {name: x, type: Proximity, parent: A}\n"
+    )
+    for end in ("urdf", "sdf"):
+        output = " ".join(run("convert", tmp_path / "m.yaml", "-o", tmp_path / f"m.{end}").split())
+        for words in (
+            "1 ghost object is left out", "1 suture is left out", "2 soft bodies are left out", "1 sensor is left out",
+            "body 'P' is soft tissue", "'friction' of 2 bodies", "'ligature needle' of 1 body", "'controller' of 1 joint",
+            "'damping' of 1 joint", "'gravity' of the file",
+        ):  # fmt: skip
+            assert words in output, (words, output)
+        assert "restitution" not in output  # it is the default's
+
+
 def test_a_urdf_robot_moves_in_the_simulator_as_its_file_states(tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text(URDF)
     output = run("convert", tmp_path / "r.urdf", "-o", tmp_path / "out" / "r.yaml")

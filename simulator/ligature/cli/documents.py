@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from ligature.adf import AdfError, Document, Resolver, Severity, read_any
+from ligature.adf import AdfError, Document, Element, Resolver, Severity, read_any
 from ligature.adf.update import items_of, new_text, same
 from ligature.authoring.generate import mass_keys
 from ligature.authoring.lint.subject import Subject
@@ -128,21 +128,28 @@ def inertia(file: Path, density: float, mass: float | None, console: Console) ->
         console.print(f"{file}: the file has no body; give a mesh or a model", style="red", markup=False)
         return 1
     for body in subject.bodies.values():
-        shapes = [(shape, T) for shape, T in subject.shapes(body) if shape.kind != "PLANE"]
-        mesh = subject.mesh(body, "mesh")
         try:
-            if shapes:
-                solid = shapes_properties(shapes)
-            elif mesh is not None:
-                solid = mass_properties(*joined(mesh.parts))
-            else:
-                raise ValueError("there is neither a mesh nor a shape to measure; add a 'collision shape' or a 'mesh'")
+            solid = _solid(subject, body)
         except ValueError as error:
             console.print(f"{body.key}: {error}", markup=False)
             continue
         weight = body.number("mass") if mass is None else mass
         _print_solid(body.key, solid.with_mass(weight or density * solid.volume), console)
     return 0
+
+
+def _solid(subject: Subject, body: Element) -> MassProperties:
+    """Mass properties at unit density, of the collision shapes, else of the mesh; tissue fills what is drawn first."""
+    soft = body.has("ligature tissue")
+    mesh = subject.mesh(body, "mesh")
+    placed = (subject.looks(body) if soft else []) or subject.shapes(body)
+    shapes = [(shape, T) for shape, T in placed if shape.kind != "PLANE"]
+    if shapes and not (soft and mesh is not None):
+        return shapes_properties(shapes)
+    if mesh is None:
+        need = "a 'shape'" if soft else "a 'collision shape'"
+        raise ValueError(f"there is neither a mesh nor a shape to measure; add {need} or a 'mesh'")
+    return mass_properties(*joined(mesh.parts))
 
 
 def _print_solid(name: str, solid: MassProperties, console: Console) -> None:

@@ -8,6 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ligature.adf import AdfError, Document, Element, Resolver, Severity
 from ligature.adf.frames import Array
 from ligature.adf.references import find_by_text
@@ -125,6 +127,15 @@ class Subject:
         return [
             (self._shape(item, "shape", "geometry"), matrix_of(item.value("offset")))
             for item in element.children("compound collision shape")
+        ]
+
+    def looks(self, element: Element) -> list[tuple[Shape, Array]]:
+        """Primitives that are drawn, which soft tissue fills, and their poses in the body."""
+        if element.has("shape"):
+            return [(self._shape(element, "shape", "geometry"), np.eye(4))]
+        return [
+            (self._shape(item, "shape", "geometry"), matrix_of(item.value("offset")))
+            for item in element.children("compound shape")
         ]
 
     @staticmethod

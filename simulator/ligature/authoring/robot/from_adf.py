@@ -19,6 +19,7 @@ from ligature.authoring.conversion import shape_part
 from ligature.authoring.objfile import MeshWriteError, Paint, Surface, obj_texts
 from ligature.authoring.placement import AXIS_TURNS, JointKeys, child_pose, joint_pose, matrix_of, vector
 from ligature.authoring.robot.description import Colour, Joint, Link, MeshFile, PlacedShape, Robot, unique
+from ligature.authoring.robot.left_out import left_out
 from ligature.authoring.shapes import ROUND, Shape, shapes_properties
 from ligature.mesh.inertia import MassProperties, box_properties, mass_properties
 from ligature.mesh.load import load_mesh
@@ -33,17 +34,6 @@ KINDS = {
     "revolute": "revolute", "prismatic": "prismatic", "fixed": "fixed", "p2p": "ball", "torsion spring": "revolute",
     "linear spring": "prismatic",
 }  # fmt: skip
-LEFT_OUT = (
-    "ghost objects",
-    "sensors",
-    "actuators",
-    "cameras",
-    "lights",
-    "soft bodies",
-    "vehicles",
-    "volumes",
-    "sutures",
-)
 
 
 @dataclass
@@ -83,10 +73,7 @@ class _Exporter:
             for joint, name, (parent, child) in zip(joints, names, ends, strict=True)
             if parent is not None and child is not None
         ]
-        for section in LEFT_OUT:
-            count = len(self.document.elements(section))
-            if count:
-                self.done.notes.append(f"{count} {section} are left out")
+        self.done.notes += left_out(self.document)
         self.done.robot = replace(self.done.robot, links=links, joints=tuple(j for j in made if j is not None))
         return self.done
 
@@ -260,6 +247,8 @@ class _Exporter:
             ]
             vertices, faces = joined(tuple(parts))
         except (ValueError, KeyError):
+            return box_properties(np.full(3, 0.1))
+        if not len(vertices):
             return box_properties(np.full(3, 0.1))
         try:
             return mass_properties(vertices, faces)
