@@ -41,8 +41,8 @@ class BadValue(Exception):
 def convert(key: Key, node: Node) -> Any:
     """The value of ``node`` in the type that the schema's ``key`` requires; raises `BadValue`."""
     value = _CONVERTERS[key.type](key, node)
-    if key.least is not None and isinstance(value, int | float) and value < key.least:
-        raise BadValue(node, f"at least {key.least:g}, not {value:g}", unusable=True)
+    if key.least is not None and isinstance(value, int | float) and not _reaches(value, key.least, key.above):
+        raise BadValue(node, f"{'above' if key.above else 'at least'} {key.least:g}, not {value:g}", unusable=True)
     if key.most is not None:
         numbers = value[0] if key.type is Type.POSE else value if isinstance(value, tuple) else (value,)
         beyond = [n for n in numbers if isinstance(n, int | float) and abs(n) > key.most]
@@ -50,6 +50,10 @@ def convert(key: Key, node: Node) -> Any:
             unit = f" {key.unit.split(',')[0]}" if key.unit else ""
             raise BadValue(node, f"at most {key.most:g}{unit}, not {beyond[0]:g}", unusable=True)
     return value
+
+
+def _reaches(value: float, least: float, above: bool) -> bool:
+    return value > least if above else not value < least
 
 
 def _scalar(key: Key, node: Node) -> Any:

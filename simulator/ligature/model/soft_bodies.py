@@ -64,8 +64,6 @@ def soft_body_of(
 ) -> Callable[..., Body]:
     """Makes a soft body of ``index`` and ``identity``; ``gravity`` (3,) is the world's. Raises `GeometryError`."""
     looks, mass = visual(element, context, shaders), element.number("mass")
-    if not mass > 0.0:
-        raise _error(element, "mass", f"has a mass of {mass:g} kg", "give kilograms above 0; hold it by 'fixed nodes'")
     _report_shares(element, context)
     vertices, faces, points = _surface(element, context)
     form = form_of(element, vertices, faces, _material(element, context, vertices, faces, mass)).scaled(mass)

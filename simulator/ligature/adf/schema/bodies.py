@@ -294,7 +294,7 @@ SOFT_BODY = (
     ),
     *unused(COLLISION, *(key.path for key in COLLISION if key.path not in ("collision mesh", "scale"))),
     Key("location", POSE, POSE_ZERO, "m, rad", "initial pose"),
-    Key("mass", N, 1.0, "kg", "total mass, above 0", most=HEAVIEST),
+    Key("mass", N, 1.0, "kg", "total mass, above 0", least=0.0, above=True, most=HEAVIEST),
     *unused((Key("randomize constraints", F, doc="any value randomises their order"),)),
     Key("config", MAP, doc="Bullet's soft-body parameters; how they count: docs/tissue.md"),
     Key("config.kLST", N, 1.0, doc="linear stiffness, 0 to 1; gives Young's modulus"),

@@ -71,6 +71,8 @@ class Key:
     least, most
         Smallest value and largest magnitude that can be simulated; a value beyond is an error. ``most`` holds for each
         component of a vector, and for the position of a pose; of a length in metres it is `FARTHEST` unless given.
+    above
+        Whether ``least`` itself is too small.
     """
 
     path: str
@@ -84,6 +86,7 @@ class Key:
     fault: Fault = Fault.FILE
     least: float | None = None
     most: float | None = None
+    above: bool = False
 
     def __post_init__(self) -> None:
         if self.most is None and self.unit.split(",")[0] == "m" and self.status in (Status.USED, Status.OURS):
