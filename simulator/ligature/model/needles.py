@@ -142,7 +142,19 @@ def _check_size(arc: Arc) -> None:
 
 def _check_shapes(arc: Arc, surfaces: list[Array]) -> None:
     """Raise ValueError unless the corners (m, 3, 3) of closed surfaces are a thin wire along the arc."""
+    _check_thickness(arc, np.vstack([corners.reshape(-1, 3) for corners in surfaces]))  # large meshes end here
     points = np.vstack([_sampled(corners, arc.length / ALONG) for corners in surfaces])
+    _check_thickness(arc, points)
+    for depth in np.linspace(0.0, arc.length, ALONG + 1).tolist():
+        place = arc.point(depth)
+        if any(_inside(corners, place) for corners in surfaces):
+            continue
+        if np.sqrt(((points - place) ** 2).sum(axis=1).min()) > arc.length / GAPS:
+            raise ValueError(f"its shapes leave a gap along an arc of {1e3 * arc.length:.0f} mm")
+
+
+def _check_thickness(arc: Arc, points: Array) -> None:
+    """Raise ValueError unless points (n, 3) are close to an arc, and it is bent by more than that."""
     thickness = float(_distances(arc, points).max())
     size = f"{1e3 * thickness:.2g} mm from an arc of {1e3 * arc.length:.0f} mm"
     if arc.length < SLENDER * thickness:
@@ -150,19 +162,15 @@ def _check_shapes(arc: Arc, surfaces: list[Array]) -> None:
     bow = arc.radius * (1.0 - math.cos(0.5 * (arc.end - arc.begin)))
     if bow < BENT * thickness:
         raise ValueError(f"its shapes reach {size}, which is bent by {1e3 * bow:.2g} mm only")
-    for depth in np.linspace(0.0, arc.length, ALONG + 1).tolist():
-        place = arc.point(depth)
-        gap = np.sqrt(((points - place) ** 2).sum(axis=1).min())
-        if gap > arc.length / GAPS and not any(_inside(corners, place) for corners in surfaces):
-            raise ValueError(f"its shapes leave a gap along an arc of {1e3 * arc.length:.0f} mm")
 
 
 def _sampled(corners: Array, spacing: float) -> Array:
-    """Points (n, 3) of triangles (m, 3, 3): their corners, and between them where edges are longer than ``spacing``."""
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
-    parts = int(np.clip(np.ceil(longest / spacing), 1, FINEST))
+    """Points (n, 3) of triangles (m, 3, 3): their corners, and more along edges longer than ``spacing``."""
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    parts = int(np.clip(np.ceil(edges.max() / spacing), 1, FINEST))
     shares = np.array([(i, j, parts - i - j) for i in range(parts + 1) for j in range(parts + 1 - i)]) / parts
-    return np.asarray((shares @ corners).reshape(-1, 3))
+    between = shares @ corners[edges > spacing]
+    return np.vstack([corners.reshape(-1, 3), between.reshape(-1, 3)])
 
 
 def _distances(arc: Arc, points: Array) -> Array:
@@ -181,6 +189,8 @@ def _inside(corners: Array, place: Array) -> bool:
 
     Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983, 125.
     """
+    if (place < corners.min(axis=(0, 1))).any() or (place > corners.max(axis=(0, 1))).any():
+        return False
     a, b, c = np.moveaxis(corners - place, 1, 0)
     x, y, z = (np.linalg.norm(side, axis=1) for side in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)
