@@ -14,7 +14,7 @@ import h5py
 import ligature
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from ligature.datasets import DatasetError, DatasetWriter, rows
 from ligature.datasets.store import episode_names, join, opened
@@ -206,7 +206,27 @@ def test_the_reader_of_the_examples_says_what_it_wants(words: list[str]) -> None
     ("wrong", "message"),
     [
         ({"rate": 0.0}, "rate must be above 0 and at most 1000 samples per simulated second"),
+        *(({"rate": rate}, "rate is .+; it must be a number of samples") for rate in ("10", None, True, [10.0], 1j)),
+        ({"rate": float("nan")}, "rate must be above 0"),
         ({"size": (0, 48)}, "size is a width and a height"),
+        ({"size": (20_000, 48)}, "from 1 to 8192 each, not 20000 and 48"),
+        *(
+            ({"size": size}, "size is .+; it must be a width and a height in pixels, as")
+            for size in ("320x240", (320,), (320.5, 240), None, 320, (1, 2, 3), ("320", "240"))
+        ),
+        *(
+            ({"cameras": given}, "cameras is .+; it must be a list of names, .. for none")
+            for given in ("cameraL", None, 3)
+        ),
+        ({"cameras": ("cameraL", "cameraL")}, "cameras: 'cameraL' is there twice; give each name once"),
+        *(({"phases": given}, "phases is .+; it must be a list of names, .. for none") for given in ("reach", None, 3)),
+        *(({"phases": (given,)}, "phases: .+ is not a name; each must be a text") for given in (1, "", None)),
+        ({"phases": ("a", "b", "a")}, "phases: 'a' is there twice; give each name once"),
+        ({"phases": tuple(map(str, range(256)))}, "at most 255 phases, not 256"),
+        ({"gestures": ["G3"]}, "gestures is .+; it must be values by their names, as a dict"),
+        ({"remarks": "mine"}, "remarks is 'mine'; it must be values by their names"),
+        ({"remarks": {1: 2}}, "remarks: 1 cannot be the name of a remark"),
+        ({"remarks": {"recorded": True}}, "'recorded' is set by the writer"),
         ({"gestures": {"work": "G3"}}, "gestures: 'work' is not a phase; the phases are .+"),
         ({"phases": ("work",), "gestures": {"work": "G99"}}, "'G99' is not one of the gestures G1, G2"),
     ],
@@ -234,6 +254,178 @@ def test_a_phase_that_was_not_announced_is_refused(simulation: ligature.Simulati
         DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), phases=("work",)) as writer,
     ):
         writer.sample("knit")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"phase": "work", "arms": ["PSM9"]}, "arms: unknown arm 'PSM9'; choose from PSM1, PSM2"),
+        ({"arms": "PSM1"}, "arms is 'PSM1'; it must be a list of names"),
+        ({"extra": [1.0]}, "extra is .+; it must be values by their names, as a dict"),
+        *(
+            ({"extra": {"x": value}}, "extra: 'x' is .+; it must be floats, whole numbers of at most 64 bits, or True")
+            for value in (None, "1.5", 2**64, np.datetime64("2026"), np.timedelta64(1), 1j, object(), [1, None], b"x")
+        ),
+        *(
+            ({"extra": {"x": [1.0, value]}}, rf"extra: 'x' has {value} at \[1\]; numbers must be finite")
+            for value in (np.nan, np.inf, -np.inf)
+        ),
+    ],
+)
+def test_a_sample_that_no_dataset_can_have_is_refused_and_the_episode_goes_on(
+    simulation: ligature.Simulation, tmp_path: Path, wrong: dict, message: str
+) -> None:
+    with DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), phases=("work",), rate=1000.0) as writer:
+        for asked in ({}, wrong, {}):
+            simulation.step(1)
+            if asked:
+                with pytest.raises(ValueError, match=message):
+                    writer.sample(**asked)
+            else:
+                assert writer.sample(extra=None if "extra" not in wrong else {"x": [1.0, 2.0]})
+    with opened(tmp_path / "a.h5") as file:
+        assert file["episode_0000"].attrs["samples"] == 2
+
+
+TRUE_OR_FALSE = [True, False, np.bool_(True), np.bool_(False), np.array(True), np.array([False]), 0, 1, np.int8(1)]
+NEITHER = [None, "yes", 0.5, 1.0, 2, -1, [True], np.array([True, False]), np.array(["yes"]), float("nan"), {}, b"1"]
+
+
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(outcomes=st.lists(st.tuples(st.sampled_from([*TRUE_OR_FALSE, *NEITHER]), st.booleans()), max_size=4))
+def test_an_outcome_that_is_no_truth_value_is_refused_and_the_episode_goes_on(
+    simulation: ligature.Simulation, tmp_path_factory: pytest.TempPathFactory, outcomes: list[tuple[Any, bool]]
+) -> None:
+    """So that it never makes a dataset that nobody can read, be it the success or whether it was judged."""
+    path, kept = tmp_path_factory.mktemp("outcomes") / "a.h5", []
+    with DatasetWriter(path, simulation, cameras=(), rate=1000.0) as writer:
+        for outcome, of_judging in outcomes:
+            given = {"success": True, "judged": outcome} if of_judging else {"success": outcome, "judged": True}
+            simulation.step(1)
+            writer.sample()
+            if any(outcome is each for each in NEITHER):
+                with pytest.raises(ValueError, match="must be True or False"):
+                    writer.end_episode(**given)
+                given = {"success": False, "judged": False}
+            writer.end_episode(**given)
+            kept.append({name: bool(value) for name, value in given.items()})
+    with opened(path) as file:
+        found = [{name: file[each].attrs[name] for name in ("success", "judged")} for each in episode_names(file)]
+    assert found == kept and all(value.shape == () for each in found for value in each.values())
+
+
+NUMBERS = st.one_of(
+    st.booleans(),
+    st.integers(-(2**63), 2**63 - 1),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.sampled_from([np.int8(3), np.uint64(2**64 - 1), np.float32(0.1), np.float16(0.5), 2**62 + 1, 1764340000.123456]),
+)
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(values=st.lists(NUMBERS, min_size=1, max_size=5))
+@example(values=[2**62 + 1, True])
+@example(values=[0, 0.5])
+@example(values=[2**62 + 1, 0.5])
+@example(values=[np.int8(1), 2**40])
+def test_what_a_caller_adds_comes_back_to_the_digit(
+    simulation: ligature.Simulation, tmp_path_factory: pytest.TempPathFactory, values: list[Any]
+) -> None:
+    """Numbers keep their type; where types follow each other, the array has one that holds them all, or one is refused."""
+    path, kept = tmp_path_factory.mktemp("digits") / "a.h5", []
+    with DatasetWriter(path, simulation, cameras=(), rate=1000.0) as writer:
+        for value in values:
+            with suppress(ValueError):
+                writer.sample(extra={"x": value})
+                simulation.step(1)
+                kept.append(value)
+    with opened(path) as file:
+        found = file["episode_0000/extra/x"]
+        assert found[:].tolist() == [np.asarray(value).item() for value in kept]
+        if len({np.asarray(value).dtype for value in values}) == 1:
+            assert found.dtype == np.asarray(values[0]).dtype and len(kept) == len(values)
+
+
+def test_a_type_that_widens_keeps_rows_that_are_written_already(
+    simulation: ligature.Simulation, tmp_path: Path
+) -> None:
+    values = [*range(rows.GATHERED + 3), 0.5, 2]
+    with DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), rate=1000.0) as writer:
+        for value in values:
+            simulation.step(1)
+            assert writer.sample(extra={"x": [value, 1]})
+    with opened(tmp_path / "a.h5") as file:
+        found = file["episode_0000/extra/x"]
+        assert found[:, 0].tolist() == values and found.dtype == float and found.attrs["units"] == "the caller's"
+
+
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rate=st.integers(5, 1000) | st.floats(5.0, 1000.0), ticks=st.integers(1, 60))
+@example(rate=1000, ticks=5)
+@example(rate=100, ticks=30)
+@example(rate=60, ticks=16)
+def test_samples_are_at_their_rate_or_refused(
+    simulation: ligature.Simulation, tmp_path_factory: pytest.TempPathFactory, rate: float, ticks: int
+) -> None:
+    """A loop whose steps are no longer than a period is never refused, and late by less than a step."""
+    path, step = tmp_path_factory.mktemp("rates") / "a.h5", ticks * simulation.dt
+    refused = ""
+    with DatasetWriter(path, simulation, cameras=(), rate=rate) as writer:
+        for _ in range(40 + int(1.5 / rate / step)):
+            try:
+                writer.sample()
+            except ValueError as error:
+                refused = str(error)
+                break
+            simulation.step(ticks)
+    with opened(path) as file:
+        time = file["episode_0000/time"][:]
+    late = time - time[0] - np.arange(len(time)) / rate
+    assert late.min() >= -1e-6 and late.max() <= min(step, 1.0 / rate) + 2e-6
+    if step <= 1.0 / rate:
+        assert not refused
+    elif step > 2.0 / rate + 1e-5:
+        assert "call sample() at least every" in refused and f"would not be {float(rate):g} a second" in refused
+
+
+@pytest.mark.parametrize("end", ["end_episode", "drop_episode"])
+def test_time_that_goes_back_within_an_episode_is_refused(
+    simulation: ligature.Simulation, tmp_path: Path, end: str
+) -> None:
+    before = simulation.snapshot()
+    with DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), rate=100.0) as writer:
+        for _ in range(3):
+            simulation.step(10)
+            assert writer.sample()
+        simulation.step(5)
+        assert not writer.sample()
+        simulation.restore(before)
+        for _ in range(2):
+            with pytest.raises(ValueError, match=r"time went back .+; call end_episode\(\) or drop_episode\(\) before"):
+                writer.sample()
+        writer.end_episode(True) if end == "end_episode" else writer.drop_episode()
+        for _ in range(2):
+            simulation.step(10)
+            assert writer.sample()
+    with opened(tmp_path / "a.h5") as file:
+        counts = [file[name].attrs["samples"] for name in episode_names(file)]
+    assert counts == ([3, 2] if end == "end_episode" else [2])
+
+
+def test_a_closed_simulation_and_a_closed_dataset_are_reported(tmp_path: Path) -> None:
+    simulation = ligature.Simulation(ligature.load(SMALL))
+    with DatasetWriter(tmp_path / "a.h5", simulation, cameras=(), rate=100.0) as writer:
+        assert writer.sample()
+        simulation.close()
+        with pytest.raises(RuntimeError, match="the simulation is closed: no sample can be taken; make a new one"):
+            writer.sample()
+    with pytest.raises(DatasetError, match="a.h5' is closed; make another writer"):
+        writer.sample()
+    with opened(tmp_path / "a.h5") as file:
+        assert file["episode_0000"].attrs["samples"] == 1
+    with pytest.raises(RuntimeError, match="the simulation is closed; make a new one"):
+        DatasetWriter(tmp_path / "b.h5", simulation, cameras=())
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
 
 
 ARRAYS = st.sampled_from([(), (1,), (3,), (4,), (2, 2), (0,), (2, 0)]).map(np.zeros)
@@ -291,7 +483,9 @@ def test_a_camera_is_kept_by_its_own_name_however_it_is_asked_for(
     simulation: ligature.Simulation, tmp_path: Path, name: str
 ) -> None:
     """Messages list cameras with their namespaces."""
-    with DatasetWriter(tmp_path / "a.h5", simulation, cameras=(name, "cameraL"), size=(16, 16), rate=100.0) as writer:
+    with pytest.raises(ValueError, match="is asked for twice; name each camera once" if name != "cameraL" else "twice"):
+        DatasetWriter(tmp_path / "a.h5", simulation, cameras=(name, "cameraL"))
+    with DatasetWriter(tmp_path / "a.h5", simulation, cameras=(name,), size=(16, 16), rate=100.0) as writer:
         for _ in range(2):
             simulation.step(10)
             writer.sample()

@@ -58,16 +58,42 @@ class EpisodeRows:
         self._file = file
         self._arrays: dict[str, h5py.Dataset] = {}
         self._waiting: dict[str, list[NDArray[Any]]] = {}
+        self._types: dict[str, str] = {}
 
     def append(self, name: str, value: Any, dtype: str, **notes: str) -> None:
         """Add a row to the array ``name``; ``notes`` such as ``units`` are its attributes."""
-        row = np.asarray(value).astype(dtype)  # a copy: a row that waits must not change with the simulation
+        kind = self._types.get(name, dtype)
+        row = np.asarray(value).astype(kind)  # a copy: a row that waits must not change with the simulation
         if name not in self._arrays:
             self._create(name, row.shape, dtype, GATHERED, {}, notes)
         waiting = self._waiting.setdefault(name, [])
         waiting.append(row)
         if len(waiting) == GATHERED:
             self._write(name)
+
+    def widen(self, name: str, row: NDArray[Any]) -> bool:
+        """Give the array ``name`` a type that keeps all digits of its rows and of ``row``; False if there is none."""
+        array = self._arrays.get(name)
+        if array is None or array.dtype == row.dtype:
+            return True
+        wide = np.result_type(array.dtype, row.dtype)
+        if not _kept(row, wide):
+            return False
+        return wide == array.dtype or self._retype(name, array, wide)
+
+    def _retype(self, name: str, array: h5py.Dataset, wide: np.dtype[Any]) -> bool:
+        """Write an array anew with another type, unless that loses digits."""
+        if self._waiting.get(name):
+            self._write(name)
+        values, notes = array[:], dict(array.attrs)
+        if not _kept(values, wide):
+            return False
+        del self._file[name]
+        self._create(name, values.shape[1:], wide.str, GATHERED, {}, notes)
+        self._arrays[name].resize(len(values), axis=0)
+        self._arrays[name][:] = values
+        self._types[name] = wide.str
+        return True
 
     def append_picture(self, name: str, picture: Packed, **notes: str) -> None:
         """Add a picture to the array ``name``."""
@@ -97,6 +123,12 @@ class EpisodeRows:
         """Write the rows that wait."""
         for name in list(self._waiting):
             self._write(name)
+
+
+def _kept(values: NDArray[Any], dtype: np.dtype[Any]) -> bool:
+    """Whether numbers come back from another type as they were."""
+    with np.errstate(invalid="ignore"):
+        return bool((values.astype(dtype).astype(values.dtype) == values).all())
 
 
 def add_actions(episode: h5py.File) -> None:

@@ -23,9 +23,19 @@ from numpy.typing import NDArray
 import ligature
 from ligature.camera_simulation import Simulation
 from ligature.datasets.events import ARM_EVENTS, NEEDLE_EVENTS, EventWatch
-from ligature.datasets.labels import ACTIVITIES, GESTURES, MOST_PHASES, ActivityWatch
+from ligature.datasets.intake import (
+    check_gestures,
+    phases_of,
+    rate_of,
+    remarks_of,
+    size_of,
+    truth_of,
+    unique_names,
+    values_of,
+)
+from ligature.datasets.labels import ACTIVITIES, ActivityWatch
 from ligature.datasets.rows import EpisodeRows, Packed, add_actions
-from ligature.datasets.store import EpisodeStore, unwritable
+from ligature.datasets.store import DatasetError, EpisodeStore, unwritable
 from ligature.kernels import released
 from ligature.model.scene import ArmDescription, ArmKind, JointType, Scene
 from ligature.model.soft import TissueBody
@@ -40,12 +50,6 @@ FORMAT = "ligature dataset 2"
 DEPTH_UNIT = 1e-4
 """Metres of one step of depth: 0.1 mm, so that two bytes reach 6.5 m. 0 means background."""
 
-OWN = frozenset({
-    "format", "version", "scene", "rate", "phases", "activities", "gestures", "depth_unit", "closed", "success",
-    "samples",
-})  # fmt: skip
-"""Attributes that no remark may replace."""
-
 WAITING = 2
 """Samples of which pictures may still be developed when the next one begins; each takes megabytes."""
 
@@ -56,8 +60,6 @@ EARLY = 1e-6
 """Seconds before its time at which a sample is taken, for the rounding of simulated time."""
 
 JOINT_ROWS, POSE, TWIST, WRENCH = "position, velocity, effort", "x y z qx qy qz qw", "v w", "f t"
-
-Array = NDArray[np.float64]
 
 Value = tuple[str, Any, dict[str, Any]]
 """Name and value of what one sample has, and how `EpisodeRows.append` keeps it."""
@@ -95,7 +97,9 @@ class DatasetWriter:
     DatasetError
         When the file exists, or cannot be written, also while it grows.
     ValueError
-        For a rate, a size, a phase or a gesture that cannot be.
+        For a rate, a size, a camera, a phase, a gesture or a remark that cannot be.
+    RuntimeError
+        For a simulation that is closed.
     """
 
     def __init__(
@@ -110,14 +114,16 @@ class DatasetWriter:
         gestures: Mapping[str, str] | None = None,
         remarks: Mapping[str, float | int | str] | None = None,
     ) -> None:
-        _check(rate, size, phases, gestures or {})
-        _check_texts({"task": task, **{f"phase {k}": phase for k, phase in enumerate(phases)}, **(remarks or {})})
-        path = Path(path)
-        self._path, self._simulation = path, simulation
-        self._size, self._rate, self._period = size, rate, 1.0 / rate
-        self._cameras = _named(simulation, cameras)
-        self._phases, self._task = ("", *phases), task
-        self._gestures, self._remarks = dict(gestures or {}), dict(remarks or {})
+        if simulation.closed:
+            raise RuntimeError("the simulation is closed; make a new one before its dataset")
+        self._path, self._simulation = Path(path), simulation
+        self._size, self._rate = size_of(size), rate_of(rate)
+        self._period = 1.0 / self._rate
+        self._phases, self._task = ("", *phases_of(phases)), task
+        check_gestures(gestures, self._phases[1:])
+        self._gestures = dict(gestures or {})
+        self._remarks = remarks_of({"task": task}) | remarks_of(remarks, of_all=True)
+        self._cameras = _named(simulation, unique_names("cameras", cameras))
         self._watch, self._events = ActivityWatch(simulation.scene), EventWatch(simulation)
         self._episode: h5py.File | None = None
         self._rows: EpisodeRows | None = None
@@ -125,11 +131,11 @@ class DatasetWriter:
         self._developed: deque[Future[list[Picture]]] = deque()
         self._laboratory = ThreadPoolExecutor(1, "pictures")
         self._shapes: dict[str, tuple[int, ...]] = {}
-        self._samples, self._due, self._ended = 0, 0.0, False
+        self._samples, self._due, self._seen, self._ended = 0, 0.0, 0.0, False
         try:
-            self._store = EpisodeStore(path, self._describe)
+            self._store = EpisodeStore(self._path, self._describe)
         except OSError as error:
-            raise unwritable(path, error) from error
+            raise unwritable(self._path, error) from error
 
     def _describe(self, file: h5py.File) -> None:
         """Write the attributes that are the same for all episodes."""
@@ -139,8 +145,7 @@ class DatasetWriter:
         attributes["phases"], attributes["activities"] = list(self._phases), list(ACTIVITIES)
         attributes["gestures"] = [self._gestures.get(phase, "") for phase in self._phases]
         attributes["depth_unit"] = DEPTH_UNIT
-        for name, value in self._remarks.items():
-            attributes[name] = value
+        attributes.update(self._remarks)
         names = [body.identity.topic for body in scene.bodies] + [ghost.identity.topic for ghost in scene.ghosts]
         file["id_names"] = np.array(["", *names], dtype=h5py.string_dtype())
         for arm in scene.arms:
@@ -169,46 +174,86 @@ class DatasetWriter:
 
         ``arms`` are those that do what ``phase`` names, by default all; ``extra`` are further numbers by name, such as
         an environment's observation, with the same names and shapes in each sample of an episode. Raises ValueError for
-        a phase that was not announced and for numbers that cannot be kept; the episode is then as before.
+        a phase that was not announced, for an arm that the scene lacks, for numbers that cannot be kept or are not
+        finite, and where time went back or a sample is more than a period late; the episode is then as before. Raises
+        RuntimeError when the simulation or the dataset is closed.
         """
         if phase not in self._phases:
             raise ValueError(f"unknown phase '{phase}'; choose one of {', '.join(self._phases[1:]) or 'none'}")
-        time = self._simulation.time
+        doers, time = self._doers(arms), self._now()
         if self._episode is not None and time < self._due - EARLY:
             return False
-        extras = self._extras(extra or {})
+        extras = self._extras(extra)
         with self._writing():
             if self._episode is None:
                 self._begin(time)
-            self._shapes = {name: value.shape for name, value in extras.items()}
             assert self._rows is not None
+            self._widen(extras)
+            self._shapes = {name: value.shape for name, value in extras.items()}
             self._append_pictures(WAITING)
             self._expose()
-            for name, value, options in self._values(phase, arms):
+            for name, value, options in self._values(phase, doers):
                 self._rows.append(name, value, **options)
             for name, value in extras.items():
-                self._rows.append(f"extra/{name}", value, "f4", units="the caller's")
+                self._rows.append(f"extra/{name}", value, value.dtype.str, units="the caller's")
             self._store.check()
         self._samples += 1
         self._due += self._period
         return True
 
-    def _extras(self, extra: Mapping[str, Any]) -> dict[str, Array]:
+    def _doers(self, arms: Collection[str] | None) -> Collection[str] | None:
+        """The arms that do what a phase names, all of which are in the scene."""
+        if arms is None:
+            return None
+        known, doers = [arm.name for arm in self._simulation.scene.arms], unique_names("arms", arms)
+        for name in doers:
+            if name not in known:
+                raise ValueError(f"arms: unknown arm '{name}'; choose from {', '.join(known) or 'none'}")
+        return doers
+
+    def _now(self) -> float:
+        """The simulated time, at which a sample can be taken; raises where none can."""
+        if self._ended:
+            raise DatasetError(f"the dataset '{self._path}' is closed; make another writer for another file")
+        if self._simulation.closed:
+            raise RuntimeError("the simulation is closed: no sample can be taken; make a new one, and a new writer")
+        time = self._simulation.time
+        if self._episode is not None:
+            self._check_time(time)
+        self._seen = time
+        return time
+
+    def _check_time(self, time: float) -> None:
+        """Raise ValueError where samples of the present episode would not be at its rate."""
+        if time < self._seen - EARLY:
+            raise ValueError(
+                f"time went back from {self._seen:g} to {time:g} s within an episode; call end_episode() or "
+                "drop_episode() before you restore a snapshot"
+            )
+        if time - self._due > self._period + EARLY:
+            raise ValueError(
+                f"a sample was due at {self._due:g} s, and it is {time:g} s: samples would not be {self._rate:g} a "
+                f"second; call sample() at least every {self._period:.3g} simulated seconds, or give a lower rate. "
+                "end_episode() keeps the samples so far"
+            )
+
+    def _extras(self, extra: Mapping[str, Any] | None) -> dict[str, NDArray[Any]]:
         """The caller's numbers; ValueError for names and shapes that are not those of the samples before."""
-        found = {}
-        for name, value in extra.items():
-            if not isinstance(name, str) or not name.isprintable() or name in ("", ".", "..") or "/" in name:
-                raise ValueError(f"extra: {name!r} cannot be the name of an array; use letters, digits and _")
-            try:
-                found[name] = np.asarray(value, dtype=float)
-            except (TypeError, ValueError) as error:
-                raise ValueError(f"extra: '{name}' is not an array of numbers: {error}") from error
-            if not found[name].size:
-                raise ValueError(f"extra: '{name}' is empty")
+        found = values_of(extra)
         shapes = {name: value.shape for name, value in found.items()}
         if self._episode is not None and shapes != self._shapes:
             raise ValueError(f"extra: all samples of an episode have the arrays {self._shapes}, not {shapes}")
         return found
+
+    def _widen(self, extras: Mapping[str, NDArray[Any]]) -> None:
+        """Let the caller's arrays have the types of these numbers too, as where whole ones are followed by others."""
+        assert self._rows is not None
+        for name, value in extras.items():
+            if not self._rows.widen(f"extra/{name}", value):
+                raise ValueError(
+                    f"extra: '{name}' is {value.dtype} after other types, and no type keeps all digits of both; it "
+                    "must have the same type in all samples of an episode"
+                )
 
     def _begin(self, time: float) -> None:
         self._episode = self._store.begin()
@@ -220,11 +265,13 @@ class DatasetWriter:
         """End the episode, with ``success`` and ``remarks`` as its attributes; from now on it is on the disk.
 
         ``task`` among the remarks replaces that of the dataset. Without a sample there is none to end. Raises
-        ValueError for a remark that is neither a number nor a text; the episode goes on then.
+        ValueError for a success that is not a truth value, and for a remark that is neither a number nor a text; the
+        episode goes on then.
         """
+        success = truth_of("success", success)
+        kept = remarks_of(remarks)
         if self._episode is None:
             return
-        _check_texts(remarks)
         with self._writing():
             assert self._rows is not None
             self._develop()
@@ -232,8 +279,7 @@ class DatasetWriter:
             self._rows.finish()
             attributes = self._episode.attrs
             attributes["success"], attributes["samples"], attributes["task"] = success, self._samples, self._task
-            for name, value in remarks.items():
-                attributes[name] = value
+            attributes.update(kept)
             add_actions(self._episode)
             self._forget()
             self._store.finish()
@@ -356,7 +402,7 @@ class DatasetWriter:
                 try:
                     self._store.close(empty=False)
                 except (OSError, RuntimeError) as second:
-                    kept += f" ({second})" if self.count else ""
+                    kept += f" ({second})" if self.count and str(second) != str(error) else ""
                 raise unwritable(self._path, error, kept) from error
 
     def __enter__(self) -> DatasetWriter:
@@ -424,49 +470,17 @@ def _count(
             ids[y, x] = numbers[y, x]
 
 
-def _check_texts(remarks: Mapping[str, Any]) -> None:
-    """Raise ValueError for an attribute that HDF5 cannot keep, or that is one of the format's own."""
-    for name, value in remarks.items():
-        if name in OWN:
-            raise ValueError(f"'{name}' is set by the writer; give your remark another name")
-        if name == "task" and not isinstance(value, str):
-            raise ValueError(f"'task' is a {type(value).__name__}; it must be a text")
-        if not isinstance(value, bool | int | float | str | np.bool_ | np.number):
-            raise ValueError(f"'{name}' is a {type(value).__name__}; it must be a number or a text")
-        if isinstance(value, int) and not -(2**63) <= value < 2**64:
-            raise ValueError(f"'{name}' is {value}, which has more than 64 bits; give it as a text")
-        if isinstance(value, str) and not _is_kept(value):
-            raise ValueError(f"'{name}' is {value!r}, which no file can hold; leave out NUL and lone surrogates")
-
-
-def _is_kept(text: str) -> bool:
-    """Whether HDF5 gives a text back as it is."""
-    return "\0" not in text and not any("\ud800" <= letter <= "\udfff" for letter in text)
-
-
 def _named(simulation: Simulation, cameras: Sequence[str]) -> dict[str, CameraHandle]:
     """Cameras by the last part of their names: arrays of a dataset lie under names without slashes."""
     found: dict[str, CameraHandle] = {}
     for name in cameras:
         handle, short = simulation.cameras[name], name.rpartition("/")[2]
-        if found.setdefault(short, handle) is not handle:
+        if found.get(short) is handle:
+            raise ValueError(f"cameras: '{name}' is asked for twice; name each camera once")
+        if short in found:
             raise ValueError(f"cameras: two are called '{short}'; a dataset can have one of them")
+        found[short] = handle
     return found
-
-
-def _check(rate: float, size: tuple[int, int], phases: Sequence[str], gestures: Mapping[str, str]) -> None:
-    """Raise ValueError for settings that a dataset cannot have."""
-    if not 0.0 < rate <= 1000.0:
-        raise ValueError(f"rate must be above 0 and at most 1000 samples per simulated second, not {rate:g}")
-    if min(size) < 1:
-        raise ValueError(f"size is a width and a height in pixels, at least 1 each, not {size}")
-    if len(phases) > MOST_PHASES:
-        raise ValueError(f"a dataset has at most {MOST_PHASES} phases, not {len(phases)}")
-    for phase, gesture in gestures.items():
-        if phase not in phases:
-            raise ValueError(f"gestures: '{phase}' is not a phase; the phases are {', '.join(phases) or 'none'}")
-        if gesture not in GESTURES:
-            raise ValueError(f"gestures: '{gesture}' is not one of the gestures {', '.join(GESTURES)}")
 
 
 def _unit(kind: JointType) -> str:
