@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import h5py
 import ligature
 import numpy as np
 import pytest
+from ligature.cli.main import app
 from ligature.datasets import DatasetError, DatasetWriter
+from ligature.datasets.probe import probe
 from ligature.datasets.store import episode_folder, episode_names, join, opened
+from typer.testing import CliRunner
 
 from tests.datasets.killed_writers import SAMPLES
 
@@ -181,3 +184,131 @@ def test_other_files_are_no_datasets(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="not a Ligature dataset"):
         join(tmp_path / "other.h5")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["other.h5", "text"]
+
+
+# --- episodes that cannot be read -----------------------------------------------------------------
+
+DAMAGE: dict[str, tuple[Callable[[h5py.File], object], str]] = {
+    "an outcome in words": (
+        lambda file: file.attrs.create("success", "yes"),
+        "attribute 'success' of 'episode_0001' must be true or false",
+    ),
+    "an outcome as a list": (lambda file: file.attrs.create("success", [True]), "'success' of 'episode_0001' must be"),
+    "a judgement in words": (lambda file: file.attrs.create("judged", "no"), "'judged' of 'episode_0001' must be true"),
+    "no number of samples": (
+        lambda file: file.attrs.pop("samples"),
+        "attribute 'samples' of 'episode_0001' is missing",
+    ),
+    "a missing array": (lambda file: file.pop("phase"), "'episode_0001/phase' is missing or not an array"),
+    "times that jump back": (
+        lambda file: file["time"].write_direct(np.zeros(1), dest_sel=np.s_[3:4]),
+        "'episode_0001/time' does not ascend at sample 3, where it is 0",
+    ),
+    "times that stand": (
+        lambda file: file["time"].write_direct(file["time"][:], np.s_[2:3], np.s_[3:4]),
+        "'episode_0001/time' does not ascend at sample 3",
+    ),
+    "a time that is none": (
+        lambda file: file["time"].write_direct(np.full(1, np.nan), dest_sel=np.s_[3:4]),
+        "'episode_0001/time' does not ascend at sample 3, where it is nan",
+    ),
+    "a circle": (lambda file: file.create_group("circle").__setitem__("round", file["/"]), "'episode_0001/circle"),
+}
+
+
+def three(path: Path, simulation: ligature.Simulation, closed: bool) -> None:
+    """A dataset of three episodes, as a writer leaves it that ended, or that was killed."""
+    writer = written(path, simulation)
+    for number in range(3):
+        record(writer, simulation, number, 5)
+    if closed:
+        writer.close()
+
+
+@pytest.mark.parametrize("closed", [True, False], ids=["closed", "growing"])
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_an_episode_that_cannot_be_read_is_named_and_the_others_are_reached(
+    simulation: ligature.Simulation, tmp_path: Path, damage: str, closed: bool
+) -> None:
+    path = tmp_path / "a.h5"
+    three(path, simulation, closed)
+    change, why = DAMAGE[damage]
+    with h5py.File(path if closed else episode_folder(path) / "episode_0001.h5", "r+") as file:
+        change(file["episode_0001"] if closed else file)
+    with pytest.raises(DatasetError, match=r"a\.h5' is not a valid dataset: episode_0001: ") as strict:
+        opened(path)
+    assert why in str(strict.value) and "/'" not in str(strict.value)
+    bad: dict[str, str] = {}
+    with opened(path, bad) as file:
+        assert list(bad) == ["episode_0001"] and why in bad["episode_0001"]
+        assert episode_names(file, bad) == ["episode_0000", "episode_0002"]
+        assert [file[name].attrs["number"] for name in episode_names(file, bad)] == [0, 2]
+    printed = CliRunner().invoke(app, ["dataset", "info", str(path)])
+    assert printed.exit_code == 1 and why in printed.output.replace("\n", " ")
+    assert "episode_0000: 5 samples" in printed.output and "episode_0002: 5 samples" in printed.output
+
+
+def test_joining_leaves_an_episode_that_cannot_be_read_where_it_is(
+    simulation: ligature.Simulation, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.h5"
+    three(path, simulation, closed=False)
+    lost = episode_folder(path) / "episode_0001.h5"
+    with h5py.File(lost, "r+") as file:
+        file.attrs["success"] = "yes"
+    with pytest.raises(DatasetError, match="episode_0001: attribute 'success' of 'episode_0001' must be"):
+        join(path)
+    assert len(list(episode_folder(path).iterdir())) == 3, "an error leaves all as it was"
+    printed = CliRunner().invoke(app, ["dataset", "join", str(path)])
+    output = printed.output.replace("\n", " ")
+    assert printed.exit_code == 1 and "2 episodes in one file" in output and "episode_0001: attribute" in output
+    with opened(path) as file:
+        assert file.attrs["closed"] and episode_names(file) == ["episode_0000", "episode_0002"]
+    assert list(episode_folder(path).iterdir()) == [lost]
+
+
+@pytest.mark.parametrize("gone", [(1,), (0, 1, 2)])
+def test_an_episode_whose_file_is_gone_is_named(
+    simulation: ligature.Simulation, tmp_path: Path, gone: tuple[int, ...]
+) -> None:
+    path = tmp_path / "a.h5"
+    three(path, simulation, closed=False)
+    for number in gone:
+        (episode_folder(path) / f"episode_000{number}.h5").unlink()
+    bad: dict[str, str] = {}
+    with opened(path, bad):
+        assert list(bad) == [f"episode_000{number}" for number in gone]
+    if len(gone) < 3:
+        assert join(path, {}) == 2
+    else:
+        with pytest.raises(DatasetError, match="episode_0000: "):
+            join(path, {})
+
+
+def test_a_writer_that_closes_keeps_what_can_be_read_and_names_the_rest_once(
+    simulation: ligature.Simulation, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.h5"
+    with pytest.raises(DatasetError) as raised, written(path, simulation) as writer:
+        for number in range(3):
+            record(writer, simulation, number, 5)
+        with h5py.File(episode_folder(path) / "episode_0001.h5", "r+") as file:
+            file.attrs["success"] = "yes"
+    assert str(raised.value).count("attribute 'success' of 'episode_0001'") == 1
+    with opened(path) as file:
+        assert episode_names(file) == ["episode_0000", "episode_0002"]
+    assert [place.name for place in episode_folder(path).iterdir()] == ["episode_0001.h5"]
+
+
+def test_bytes_of_an_episode_that_cannot_be_unpacked_are_found_before_they_are_read(
+    simulation: ligature.Simulation, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.h5"
+    three(path, simulation, closed=True)
+    with h5py.File(path, "r+") as file:
+        del file["episode_0001/phase"]
+        array = file.create_dataset("episode_0001/phase", (5,), "u1", chunks=(5,), compression="gzip")
+        array.id.write_direct_chunk((0,), b"no deflate")
+    assert list(probe(path)) == ["episode_0001"]
+    printed = CliRunner().invoke(app, ["dataset", "info", str(path)])
+    assert printed.exit_code == 1 and "episode_0002: 5 samples" in printed.output and "episode_0001: " in printed.output

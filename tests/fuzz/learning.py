@@ -143,10 +143,13 @@ def read_dataset(path: Path) -> None:
     console = Console(file=io.StringIO(), width=10_000)
     out = path.parent / "exported"
     shutil.rmtree(out, ignore_errors=True)
-    status = info(path, console) or export(path, out, "lerobot-3.0", "h264", "", console)
+    listed = info(path, console)
+    printed = console.file.getvalue()  # type: ignore[attr-defined]
+    exported = export(path, out, "lerobot-3.0", "h264", "", console)
     shutil.rmtree(out, ignore_errors=True)
-    if status:
-        raise Refused(console.file.getvalue().splitlines()[-1])  # type: ignore[attr-defined]
+    if listed or exported:
+        words = printed if listed else console.file.getvalue()  # type: ignore[attr-defined]
+        raise Refused(words.splitlines()[-1])
 
 
 # --- randomisations and networks --------------------------------------------------------------

@@ -269,7 +269,7 @@ def test_a_file_on_which_hdf5_crashes_is_reported(tmp_path: Path, monkeypatch: p
     """The library reads some damaged files beyond their ends; the look at them happens in another process."""
     from ligature.datasets import probe
 
-    monkeypatch.setattr(probe, "opened", lambda path: os.kill(os.getpid(), signal.SIGKILL))
+    monkeypatch.setattr(probe, "opened", lambda *_: os.kill(os.getpid(), signal.SIGKILL))
     path = tmp_path / "a.h5"
     path.write_bytes(learning.dataset_bytes())
     assert "is damaged: reading it crashes (SIGKILL)" in refusal(learning.read_dataset, path)

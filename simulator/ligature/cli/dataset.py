@@ -1,4 +1,7 @@
-"""``ligature dataset``: what is in a dataset, one file of an interrupted one, and the formats of LeRobot."""
+"""``ligature dataset``: what is in a dataset, one file of an interrupted one, and the formats of LeRobot.
+
+Where an episode cannot be read, the others can.
+"""
 
 from __future__ import annotations
 
@@ -12,28 +15,30 @@ from rich.console import Console
 
 from ligature.cli.numbers import counted
 from ligature.datasets.probe import probe
-from ligature.datasets.store import DatasetError, damaged, episode_names, join, opened
+from ligature.datasets.store import DatasetError, damaged, episode_names, invalid, join, opened
 
 
 def info(file: Path, console: Console) -> int:
-    """Print the episodes of a dataset; the exit status is 1 for a file that is not a dataset."""
+    """Print the episodes of a dataset; the exit status is 1 where it, or one of them, cannot be read."""
 
-    def report() -> None:
-        with opened(file) as found:
-            attributes, names = found.attrs, episode_names(found)
+    def report(bad: dict[str, str]) -> None:
+        with opened(file, bad) as found:
+            attributes, names = found.attrs, episode_names(found, bad)
             closed = "" if attributes.get("closed", True) else "; 'ligature dataset join' makes one file of it"
             write(f"{attributes['format']} of Ligature {attributes['version']}, scene {attributes['scene']}{closed}")
             arms = ", ".join(found.get("arms", ()))
             write(f"{counted(len(names), 'episode')} at {attributes['rate']:g} samples a second, arms {arms}")
             for name in names:
-                write(f"{name}: {_episode(found[name], list(map(str, attributes['phases'])))}")
+                write(f"{name}: {_episode(found[name], attributes)}")
+        if bad:
+            raise DatasetError(invalid(file, bad))
 
     write = _printer(console)
     return _reported(report, file, console)
 
 
-def _episode(episode: Any, phases: list[str]) -> str:
-    attributes = episode.attrs
+def _episode(episode: Any, of_all: Any) -> str:
+    attributes, phases = episode.attrs, list(map(str, of_all["phases"]))
     outcome = "success" if attributes["success"] else "failure"
     labels, counts = np.unique(episode["phase"][:], return_counts=True)
     shares = ", ".join(f"{phases[k] or 'none'} {n}" for k, n in zip(labels, counts, strict=True))
@@ -42,13 +47,19 @@ def _episode(episode: Any, phases: list[str]) -> str:
 
 def join_episodes(file: Path, console: Console) -> int:
     """Make one file of a dataset whose writer was killed."""
-    return _reported(lambda: _printer(console)(f"{file}: {counted(join(file), 'episode')} in one file"), file, console)
+
+    def run(bad: dict[str, str]) -> None:
+        _printer(console)(f"{file}: {counted(join(file, bad), 'episode')} in one file")
+        if bad:
+            raise DatasetError(f"{invalid(file, bad)}; their files stay where they are")
+
+    return _reported(run, file, console)
 
 
 def export(source: Path, target: Path, format: str, codec: str, license: str, console: Console) -> int:
     """Write a dataset in one of LeRobot's formats; the exit status is 1 when that is not possible."""
 
-    def write() -> None:
+    def write(bad: dict[str, str]) -> None:
         from ligature.datasets.lerobot import export as run_export
 
         begin = time.perf_counter()
@@ -66,11 +77,12 @@ def _printer(console: Console) -> Callable[[str], None]:
     return lambda text: console.print(text, markup=False)
 
 
-def _reported(work: Callable[[], None], file: Path, console: Console) -> int:
+def _reported(work: Callable[[dict[str, str]], None], file: Path, console: Console) -> int:
+    """The exit status of ``work``, which takes the episodes that cannot be read, with the reasons."""
     try:
-        probe(file)
+        bad = probe(file)
         with damaged(file):
-            work()
+            work(bad)
     except (DatasetError, ValueError) as error:
         console.print(str(error), style="red", markup=False)
         return 1

@@ -8,7 +8,6 @@ from __future__ import annotations
 import operator
 import reprlib
 from collections.abc import Iterable, Mapping
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -74,12 +73,10 @@ def check_gestures(gestures: object, phases: tuple[str, ...]) -> None:
 
 def rate_of(rate: object) -> float:
     """Samples per simulated second."""
-    if isinstance(rate, bool) or not isinstance(rate, Real):
+    if isinstance(rate, bool) or not isinstance(rate, int | float | np.integer | np.floating):
         raise ValueError(f"rate is {_shown(rate)}; it must be a number of samples per simulated second")
     if not 0.0 < rate <= MOST_RATE:
-        raise ValueError(
-            f"rate must be above 0 and at most {MOST_RATE:g} samples per simulated second, not {float(rate):g}"
-        )
+        raise ValueError(f"rate must be above 0 and at most {MOST_RATE:g} samples per simulated second, not {rate}")
     return float(rate)
 
 

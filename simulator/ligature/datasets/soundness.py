@@ -8,12 +8,15 @@ machine, or lack what every reader counts on. Arrays are described by the number
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+
+from ligature.paths import printable
 
 MOST_LEVELS = 6
 MOST_ITEMS = 1_000_000
@@ -63,20 +66,55 @@ POSES, FARTHEST = frozenset({"local_measured_cp", "local_setpoint_cp", "local_ac
 """Arrays of poses, and the largest number in one."""
 
 
+EPISODE = "episode_"
+"""What names of episodes begin with."""
+
+UNREADABLE = (OSError, RuntimeError, KeyError, UnicodeError)
+"""Errors of HDF5 for bytes that it cannot read."""
+
+
 class Unsound(ValueError):
     """What a dataset lacks, or has and must not have."""
 
 
-def check(file: h5py.File, path: Path) -> None:
-    """Raise `Unsound` unless every reader can read the dataset ``file``, which is the file ``path``."""
-    _Walk(f"{path.name}.episodes").walk(file, "", 0)
+def check(file: h5py.File, path: Path, bad: dict[str, str]) -> None:
+    """Raise `Unsound` unless every reader can read the dataset ``file``, which is the file ``path``.
+
+    Episodes that are not sound are added to ``bad``, with the reasons; those that are in it are not looked at.
+    """
+    _Walk(f"{path.name}.episodes").visit(file, bad)
     phases = _described(file)
     arms = {name: _arm(arm, name) for name, arm in file.get("arms", {}).items()}
-    whole = file.attrs["format"] == "ligature dataset 2"
-    for name in file:
-        if name.startswith("episode_"):
-            recorded = bool(file.attrs.get("recorded", False))
+    whole, recorded = file.attrs["format"] == "ligature dataset 2", bool(file.attrs.get("recorded", False))
+    for name in episode_names(file, bad):
+        with held_against(name, bad):
             _Episode(_group(file, name), name, phases, recorded).check(arms if whole else {})
+
+
+def episode_names(file: h5py.File, bad: Collection[str] = ()) -> list[str]:
+    """The episodes of a dataset, in their order, without the ``bad`` ones."""
+    names = [name for name in file if name.startswith(EPISODE) and name not in bad]
+    return sorted(names, key=lambda name: (len(name), name))
+
+
+@contextmanager
+def held_against(name: str, bad: dict[str, str]) -> Iterator[None]:
+    """Adds what is wrong with the episode ``name``, or with an item that is none, to ``bad`` or raises it."""
+    try:
+        yield
+    except (Unsound, *UNREADABLE) as error:
+        if not name.startswith(EPISODE) or isinstance(error, TooMany):
+            raise
+        bad[name] = why(error)
+
+
+def why(error: Exception) -> str:
+    """What was wrong, as a text."""
+    return printable(error.args[0] if error.args and not isinstance(error, UnicodeError) else error)
+
+
+class TooMany(Unsound):
+    """More than a reader looks at, wherever it is."""
 
 
 class _Walk:
@@ -85,21 +123,27 @@ class _Walk:
     def __init__(self, episodes: str) -> None:
         self._episodes, self._seen, self._count = episodes, set[tuple[int, int]](), 0
 
-    def walk(self, group: Any, name: str, level: int) -> None:
-        if level > MOST_LEVELS:
-            raise Unsound(f"'{name}' is nested in more than {MOST_LEVELS} groups")
-        for key in group:
-            inner = f"{name}/{key}" if name else key
-            self._count += 1
-            if self._count > MOST_ITEMS:
-                raise Unsound(f"it has more than {MOST_ITEMS} items")
-            item = self._item(group, key, inner, level)
-            if isinstance(item, h5py.Group):
-                self.walk(item, inner, level + 1)
-            elif isinstance(item, h5py.Dataset):
-                _check_stored(item, inner)
-            else:
-                raise Unsound(f"'{inner}' is neither a group nor an array")
+    def visit(self, file: h5py.File, bad: dict[str, str]) -> None:
+        """Visit all; episodes in which something is wrong are added to ``bad``."""
+        for key in file:
+            if key not in bad:
+                with held_against(key, bad):
+                    self._enter(file, key, key, 0)
+
+    def _enter(self, group: Any, key: str, name: str, level: int) -> None:
+        self._count += 1
+        if self._count > MOST_ITEMS:
+            raise TooMany(f"it has more than {MOST_ITEMS} items")
+        item = self._item(group, key, name, level)
+        if isinstance(item, h5py.Group):
+            if level == MOST_LEVELS:
+                raise Unsound(f"'{name}' is nested in more than {MOST_LEVELS} groups")
+            for inner in item:
+                self._enter(item, inner, f"{name}/{inner}", level + 1)
+        elif isinstance(item, h5py.Dataset):
+            _check_stored(item, name)
+        else:
+            raise Unsound(f"'{name}' is neither a group nor an array")
 
     def _item(self, group: Any, key: str, name: str, level: int) -> Any:
         link = group.get(key, getlink=True)
@@ -172,11 +216,11 @@ class _Episode:
     def check(self, arms: dict[str, tuple[int, bool]]) -> None:
         """Check all that the format asks for; ``arms`` are joints and jaw of each arm."""
         group = self._group
-        _attribute(group, "samples", "a whole number", lambda v: _is_number(v, WHOLE) and v >= 0)
+        _attribute(group, "samples", "a whole number", lambda v: _is_number(v, WHOLE) and v >= 0, self._name)
         for key in ("success", "judged") if "judged" in group.attrs else ("success",):
-            _attribute(group, key, "true or false", lambda v: _is_number(v, WHOLE))
+            _attribute(group, key, "true or false", lambda v: _is_number(v, WHOLE), self._name)
         if "task" in group.attrs or arms:
-            _attribute(group, "task", "a text", _is_text)
+            _attribute(group, "task", "a text", _is_text, self._name)
         self._lengths["n"] = int(group.attrs["samples"])
         for name, shape in ARRAYS.items():
             self._array(name, shape)
@@ -220,8 +264,18 @@ class _Episode:
             raise Unsound(f"'{place}' is {found} of {array.dtype}; it must be {means} numbers")
         if last in POSES and not (np.abs(array[:]) <= FARTHEST).all():
             raise Unsound(f"'{place}' has values that are not a valid pose")
+        if name == "time":
+            _check_times(array[:], place)
         if last in PHASES and len(array) and not 0 <= int(array[:].max()) < self._phases:
             raise Unsound(f"'{place}' has phase {int(array[:].max())}; the number of phases is {self._phases}")
+
+
+def _check_times(times: Any, place: str) -> None:
+    """Raise `Unsound` unless times ascend."""
+    ascends = np.diff(times) > 0.0
+    if not np.isfinite(times).all() or not ascends.all():
+        k = int(np.argmax(~np.isfinite(times))) if ascends.all() else int(np.argmin(ascends)) + 1
+        raise Unsound(f"'{place}' does not ascend at sample {k}, where it is {times[k]:g}")
 
 
 def _group(file: Any, name: str) -> Any:
@@ -230,8 +284,9 @@ def _group(file: Any, name: str) -> Any:
     return file[name]
 
 
-def _attribute(item: Any, key: str, what: str, holds: Callable[[Any], bool]) -> None:
-    place = f"attribute '{key}' of '{item.name}'"
+def _attribute(item: Any, key: str, what: str, holds: Callable[[Any], bool], name: str = "") -> None:
+    """Check an attribute; ``name`` is that of an item whose file may be its own, where it is called ``/``."""
+    place = f"attribute '{key}' of '{name or item.name}'"
     if key not in item.attrs:
         raise Unsound(f"{place} is missing; it is {what}")
     if not holds(item.attrs[key]):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,11 @@ from typing import Any
 import h5py
 
 from ligature.adf.contents import mistaken
-from ligature.datasets.soundness import Unsound, check
+from ligature.datasets.soundness import UNREADABLE, Unsound, check, episode_names, why
 from ligature.paths import printable, reason, regular_file
+
+MOST_NAMED = 3
+"""Episodes that an error names."""
 
 Describe = Callable[[h5py.File], None]
 """Writes into a file what holds for all episodes."""
@@ -110,6 +113,7 @@ class EpisodeStore:
             )
         self._folder.mkdir()
         self._open: PartFile | None = None
+        self._joined = False
         self.count = 0
 
     def begin(self) -> h5py.File:
@@ -150,49 +154,80 @@ class EpisodeStore:
             raise
 
     def close(self, empty: bool) -> None:
-        """Join the episodes into one file; without any, there is a file only if ``empty``."""
+        """Join the episodes into one file; without any, there is a file only if ``empty``. Once is enough.
+
+        Raises `DatasetError` for episodes that cannot be read any more: their files stay, and the others are joined.
+        """
+        if self._joined:
+            return
         self.drop()
         self.count = len(list(self._folder.glob("episode_*.h5")))  # an interrupt may have come between name and count
         if self.count or empty:
             self._link()
-            join(self._path)
+            bad: dict[str, str] = {}
+            join(self._path, bad)
+            self._joined = True
+            if bad:
+                raise DatasetError(f"{invalid(self._path, bad)}; the files of these episodes stay in '{self._folder}'")
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
-def join(path: Path) -> int:
+def join(path: Path, bad: dict[str, str] | None = None) -> int:
     """Make one file of a dataset whose episodes are files of their own; returns how many episodes it has.
 
-    A dataset that is one file stays. Raises `DatasetError`, for which the dataset stays as it was.
+    A dataset that is one file stays. Episodes that no reader could read are added to ``bad``, with the reasons, and
+    their files stay where they are; without ``bad`` they are an error. Raises `DatasetError`, for which the dataset
+    stays as it was.
     """
+    found = {} if bad is None else bad
     folder = episode_folder(path)
     try:
         regular_file(path)
     except OSError as error:
         raise DatasetError(_unreadable(path, error)) from error
-    whole = PartFile(path)
+    whole, copying = PartFile(path), ""
     try:
-        with opened(path) as linked:
-            names = episode_names(linked)
+        with opened(path, bad) as linked:
+            names = episode_names(linked, found)
             if linked.attrs.get("closed", True):
                 whole.drop()
                 return len(names)
+            if found and not names:
+                raise DatasetError(invalid(path, found))
             whole.file.attrs.update(linked.attrs)
             whole.file.attrs["closed"] = True
-            for name in linked:
+            for name in [name for name in linked if name not in found]:
+                copying = name
                 linked.copy(linked[name], whole.file, name)
                 whole.check()
         whole.finish()
     except BaseException as error:
         whole.drop()
         if isinstance(error, OSError | RuntimeError) and not isinstance(error, DatasetError):
-            raise DatasetError(f"cannot join the episodes of '{path}': {error}; they stay in '{folder}'") from error
+            at = f" ({copying})" if copying else ""
+            raise DatasetError(f"cannot join the episodes of '{path}'{at}: {error}; they stay in '{folder}'") from error
         raise
-    shutil.rmtree(folder, ignore_errors=True)
+    for name in names:
+        (folder / f"{name}.h5").unlink(missing_ok=True)
+    if not found:
+        shutil.rmtree(folder, ignore_errors=True)
     return len(names)
 
 
-def opened(path: Path) -> h5py.File:
-    """A dataset for reading; raises `DatasetError` for a file that is none, or that no reader could read."""
+def invalid(path: Path, bad: Mapping[str, str]) -> str:
+    """What is reported of a dataset with ``bad`` episodes."""
+    listed = [f"{printable(name)}: {reason}" for name, reason in list(bad.items())[:MOST_NAMED]]
+    more = [f"and {len(bad) - MOST_NAMED} other episodes"] if len(bad) > MOST_NAMED else []
+    return f"'{path}' is not a valid dataset: {'; '.join([*listed, *more])}"
+
+
+def opened(path: Path, bad: dict[str, str] | None = None) -> h5py.File:
+    """A dataset for reading; raises `DatasetError` for a file that is none, or that no reader could read.
+
+    Episodes that are not sound are added to ``bad``, with the reasons, and are not to be read, nor are those that it
+    has already. Without ``bad`` they are an error.
+    """
+    found = {} if bad is None else bad
     try:
         file = h5py.File(regular_file(path), "r")
     except OSError as error:
@@ -201,7 +236,9 @@ def opened(path: Path) -> h5py.File:
         if not str(file.attrs.get("format", "")).startswith("ligature dataset"):
             raise DatasetError(f"'{path}' is an HDF5 file, but not a Ligature dataset")
         with damaged(path):
-            check(file, path)
+            check(file, path, found)
+        if found and bad is None:
+            raise DatasetError(invalid(path, found))
     except BaseException:
         file.close()
         raise
@@ -228,16 +265,10 @@ def damaged(path: Path) -> Iterator[None]:
         raise
     except Unsound as error:
         raise DatasetError(f"'{path}' is not a valid dataset: {printable(error)}") from error
-    except (OSError, RuntimeError, KeyError, UnicodeError) as error:
+    except UNREADABLE as error:
         if isinstance(error, OSError) and error.filename is not None:
             raise
-        why = error.args[0] if error.args and not isinstance(error, UnicodeError) else error
-        raise DatasetError(f"'{path}' is damaged: {printable(why)}") from error
-
-
-def episode_names(file: h5py.File) -> list[str]:
-    """The episodes of a dataset, in their order."""
-    return sorted((name for name in file if name.startswith("episode_")), key=lambda name: (len(name), name))
+        raise DatasetError(f"'{path}' is damaged: {why(error)}") from error
 
 
 def episode_folder(path: Path) -> Path:
