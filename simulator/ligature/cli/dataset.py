@@ -6,7 +6,7 @@ Where an episode cannot be read, the others can.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from rich.console import Console
 
 from ligature.cli.numbers import counted
 from ligature.datasets.probe import probe
+from ligature.datasets.quality import EXACT, not_finite, pace
 from ligature.datasets.store import DatasetError, damaged, episode_names, invalid, join, opened
 
 
@@ -42,7 +43,20 @@ def _episode(episode: Any, of_all: Any) -> str:
     outcome = "success" if attributes["success"] else "failure"
     labels, counts = np.unique(episode["phase"][:], return_counts=True)
     shares = ", ".join(f"{phases[k] or 'none'} {n}" for k, n in zip(labels, counts, strict=True))
-    return f"{attributes['samples']} samples, {outcome if attributes.get('judged', True) else 'not judged'}; {shares}"
+    judged = outcome if attributes.get("judged", True) else "not judged"
+    length = f"{attributes['samples']} samples, {judged}"
+    return "; ".join([length, shares, *_remarkable(episode, float(of_all["rate"]))])
+
+
+def _remarkable(episode: Any, rate: float) -> Iterator[str]:
+    """How far the times of an episode are off its rate, and numbers that are none."""
+    found = pace(episode["time"][:], rate)
+    if not found.holds:
+        yield f"its times are {found.measured:.4g} samples a second, not {rate:g}"
+    elif found.off > EXACT:
+        yield f"up to {1e3 * found.off:.3g} ms off the rate"
+    if fault := not_finite(episode):
+        yield fault
 
 
 def join_episodes(file: Path, console: Console) -> int:
@@ -63,7 +77,7 @@ def export(source: Path, target: Path, format: str, codec: str, license: str, co
         from ligature.datasets.lerobot import export as run_export
 
         begin = time.perf_counter()
-        run_export(source, target, format, codec, license, _printer(console))
+        run_export(source, target, format, codec, license, _printer(console), bad)
         size = sum(path.stat().st_size for path in target.rglob("*") if path.is_file())
         seconds = time.perf_counter() - begin
         _printer(console)(

@@ -43,13 +43,13 @@ def probe(path: Path) -> dict[str, str]:
         _look(path, writes, seconds)
     os.close(writes)
     with os.fdopen(reads, "rb") as answer:
-        said = answer.read()
+        content = answer.read()
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
         end = f"takes more than {seconds} s" if number == signal.SIGXCPU else "crashes"
         raise DatasetError(f"'{path}' is damaged: reading it {end} ({signal.Signals(number).name})")
-    found: dict[str, Any] = json.loads(said) if said else {"error": f"'{path}' is damaged: reading it ends early"}
+    found: dict[str, Any] = json.loads(content) if content else {"error": f"'{path}' is damaged: reading it ends early"}
     if found["error"]:
         raise DatasetError(found["error"])
     return dict(found["bad"])

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import h5py
-import numpy as np
+import yaml
+
+from ligature.datasets.lerobot.features import EXTRA
+from ligature.datasets.quality import pace
 
 MEANING: Mapping[str, str] = {
     "observation.state": "measured joints, the jaw after those of its arm (rad, m)",
@@ -34,6 +38,11 @@ MEANING: Mapping[str, str] = {
     "label.arm_phase": "the same for each arm, 0 where it has no part in it",
     "label.arm_activity": "what each arm does by the ground truth, by its number below",
     "next.done": "the episode ends with this sample",
+    "timestamp": "counter of LeRobot: number of the sample over the rate (s)",
+    "frame_index": "counter of LeRobot: number of the sample in its episode",
+    "episode_index": "counter of LeRobot: number of the episode",
+    "index": "counter of LeRobot: number of the sample in the dataset",
+    "task_index": "counter of LeRobot: number of the task",
     "next.success": "it ends with this sample, and is a success",
 }
 
@@ -44,33 +53,33 @@ def card(
     """The card in Markdown, with the front matter of the Hugging Face Hub; ``constant`` features are left out."""
     attributes, origin = file.attrs, _origin(file)
     hours = info["total_frames"] / info["fps"] / 3600.0
-    jitter = max(_jitter(file[name]["time"][:], info["fps"]) for name in episodes)
+    jitter = max(pace(file[name]["time"][:], info["fps"]).off for name in episodes)
     tasks = sorted({str(file[name].attrs["task"]) for name in episodes})
     done = sum(bool(file[name].attrs["success"]) for name in episodes)
     lines = [
-        "---", f"license: {license or 'unknown'}", "task_categories:", "- robotics", "tags:", "- LeRobot", "- surgical",
-        "- simulation", "configs:", "- config_name: default", "  data_files: data/*/*.parquet", "---", "",
+        "---", *_front_matter(license or "unknown"), "---", "",
         f"# {origin.title}", "",
         f"Made with Ligature {attributes['version']} {origin.place}; format LeRobot {info['codebase_version']}.", "",
         "| | |", "|---|---|", f"| episodes | {info['total_episodes']}, {done} of them successful |",
-        f"| frames | {info['total_frames']} at {info['fps']} Hz, {hours:.2f} h |", "| data type | {origin.kind} |",
-        f"| collected by | {attributes.get('source', 'unknown')} |", f"| licence | {license or 'unknown'} |",
+        f"| frames | {info['total_frames']} at {info['fps']} Hz, {hours:.2f} h |", f"| data type | {origin.kind} |",
+        f"| collected by | {_cell(attributes.get('source', 'unknown'))} |",
+        f"| licence | {_cell(license or 'unknown')} |",
         f"| splits (episodes from:to) | {', '.join(f'{name} {ends}' for name, ends in info['splits'].items())} |", "",
-        "## Tasks", "", *(f"- {text or 'without an instruction'}" for text in tasks), "",
+        "## Tasks", "", *(f"- {_cell(text) or 'without an instruction'}" for text in tasks), "",
         "## Robot", "", "| arm | instrument | base in the world (x y z qx qy qz qw) |", "|---|---|---|",
-        *(f"| {name} | {arm.attrs['tool']} | {_pose(arm)} |" for name, arm in sorted(file["arms"].items())), "",
+        *(f"| {_cell(name)} | {_cell(arm.attrs['tool'])} | {_pose(arm)} |" for name, arm in _arms(file)), "",
         "## Synchronisation", "",
         f"{origin.synchronised} `timestamp` is the number of the sample over {info['fps']} Hz; the time is up to "
         f"{1e3 * jitter:.1f} ms later (`observation.meta.sim_time`).", "",
         "## Features", "", "| name | shape | meaning |", "|---|---|---|",
-        *(f"| `{name}` | {tuple(each['shape'])} | {_meaning(name)} |" for name, each in info["features"].items()), "",
+        *(f"| `{_cell(k)}` | {tuple(each['shape'])} | {_meaning(k)} |" for k, each in info["features"].items()), "",
         "Depth, object ids and what else the simulation knows stay in the HDF5 file. Calibrations of cameras and bases "
         "of arms are in `meta/calibration.json`.", "",
         *_left_out(constant),
         "## Labels", "", "| number | phase | gesture of JIGSAWS |", "|---|---|---|",
-        *(f"| {k} | {phase or 'none'} | {gesture} |" for k, (phase, gesture) in enumerate(_phases(file))), "",
+        *(f"| {k} | {_cell(phase) or 'none'} | {gesture} |" for k, (phase, gesture) in enumerate(_phases(file))), "",
         "| number | activity of an arm |", "|---|---|",
-        *(f"| {k} | {name} |" for k, name in enumerate(map(str, attributes["activities"]))), "",
+        *(f"| {k} | {_cell(name)} |" for k, name in enumerate(map(str, attributes["activities"]))), "",
         "Grasps, releases, contacts, punctures, exits and drops are in `meta/events.jsonl`, where the dataset has "
         "them: a line each, at the first sample at or after them.", "",
         "## Limits", "",
@@ -105,13 +114,31 @@ def _origin(file: h5py.File) -> _Origin:
     )  # fmt: skip
 
 
+def _front_matter(license: str) -> list[str]:
+    """What the Hugging Face Hub reads of a card, as lines of YAML."""
+    front = {
+        "license": license, "task_categories": ["robotics"], "tags": ["LeRobot", "surgical", "simulation"],
+        "configs": [{"config_name": "default", "data_files": "data/*/*.parquet"}],
+    }  # fmt: skip
+    return str(yaml.safe_dump(front, sort_keys=False, allow_unicode=True, width=sys.maxsize)).splitlines()
+
+
+def _cell(text: object) -> str:
+    """A text of others on one line of a table."""
+    return " ".join(str(text).split()).replace("|", "\\|")
+
+
 def _left_out(constant: Sequence[str]) -> list[str]:
-    names = ", ".join(f"`{name}`" for name in constant)
+    names = ", ".join(f"`{_cell(name)}`" for name in constant)
     return [f"Left out, since they never change here: {names}.", ""] if constant else []
 
 
+def _arms(file: h5py.File) -> list[tuple[str, h5py.Group]]:
+    return sorted(file["arms"].items())
+
+
 def _phases(file: h5py.File) -> list[tuple[str, str]]:
-    return list(zip(map(str, file.attrs["phases"]), map(str, file.attrs["gestures"]), strict=True))
+    return list(zip(map(str, file.attrs["phases"]), map(_cell, file.attrs["gestures"]), strict=True))
 
 
 def _pose(arm: h5py.Group) -> str:
@@ -120,11 +147,9 @@ def _pose(arm: h5py.Group) -> str:
     return " ".join(f"{x:.5g}" for x in arm.attrs["base_pose"])
 
 
-def _jitter(time: Any, fps: int) -> float:
-    return float(np.abs(time - time[0] - np.arange(len(time)) / fps).max())
-
-
 def _meaning(name: str) -> str:
     if name.startswith("observation.images."):
         return f"camera {name.rsplit('.', 1)[1]}"
-    return MEANING.get(name, "counter of LeRobot")
+    if name.startswith(EXTRA):
+        return MEANING.get(name, "an array of the caller, as whoever recorded the dataset documents it")
+    return MEANING[name]

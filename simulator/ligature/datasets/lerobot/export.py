@@ -6,7 +6,6 @@ episode has a video of its own in both. The folder gets its name when it is whol
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,11 +19,14 @@ from numpy.typing import NDArray
 from ligature.datasets.events import listed
 from ligature.datasets.lerobot import statistics
 from ligature.datasets.lerobot.card import card
-from ligature.datasets.lerobot.features import Column, Robot, columns
-from ligature.datasets.lerobot.tables import GrowingTables, table_of, write_lines, write_rows, write_tasks
+from ligature.datasets.lerobot.features import Column, columns, types_of_extras
+from ligature.datasets.lerobot.fit import check, left_out
+from ligature.datasets.lerobot.tables import GrowingTables, json_of, table_of, write_lines, write_rows, write_tasks
 from ligature.datasets.lerobot.video import CODECS, Codec, description, encode
-from ligature.datasets.store import DatasetError, episode_names, opened
-from ligature.paths import reason
+from ligature.datasets.quality import EXACT, pace
+from ligature.datasets.soundness import episode_names
+from ligature.datasets.store import DatasetError, opened
+from ligature.paths import printable, reason
 
 FORMATS = ("lerobot-3.0", "lerobot-2.1")
 CHUNK, DATA_MEGABYTES, VIDEO_MEGABYTES = 1000, 100, 200
@@ -59,9 +61,17 @@ class _Written:
 
 
 def export(
-    source: str | Path, target: str | Path, format: str, codec: str = "h264", license: str = "", log: Log = print
+    source: str | Path,
+    target: str | Path,
+    format: str,
+    codec: str = "h264",
+    license: str = "",
+    log: Log = print,
+    bad: Mapping[str, str] | None = None,
 ) -> None:
     """Write the dataset ``source`` as the folder ``target``, which must not exist.
+
+    Episodes that cannot be read, and those of fewer than two samples, are left out.
 
     Parameters
     ----------
@@ -72,24 +82,31 @@ def export(
     license
         Of the data, for the card; an identifier of the Hugging Face Hub such as ``cc-by-4.0``.
     log
-        Takes a line for each episode.
+        Takes a line for each episode, also for one that is left out.
+    bad
+        Episodes that are known not to be readable, with the reasons.
 
     Raises
     ------
     DatasetError
         For a dataset that cannot be read, or that the format cannot hold.
     ValueError
-        For an unknown format or codec.
+        For an unknown format or codec, and for a license that is not a line of text.
     """
     for what, value, known in (("format", format, FORMATS), ("codec", codec, tuple(CODECS))):
         if value not in known:
             raise ValueError(f"{what} must be one of {', '.join(known)}, not '{value}'")
-    source, target = Path(source), Path(target)
+    if not license.isprintable():
+        raise ValueError(f"license is {license!r}; it must be a line of printable text, such as cc-by-4.0")
+    source, target, unread = Path(source), Path(target), dict(bad or {})
     if target.exists():
         raise DatasetError(f"'{target}' exists already; choose another name")
     part = target.with_name(f"{target.name}.part")
-    with opened(source) as file:
-        _check(file, source)
+    with opened(source, unread) as file:
+        out = left_out(file, unread)
+        check(file, source, out)
+        for name, why in out.items():
+            log(f"{printable(name)} is left out: {why}")
         try:
             part.mkdir(parents=True)
         except FileExistsError:
@@ -99,7 +116,7 @@ def export(
         except OSError as error:
             raise DatasetError(f"cannot write '{target}': {reason(error)}") from error
         try:
-            _Export(file, part, format, CODECS[codec], license, log).run()
+            _Export(file, episode_names(file, out), part, format, CODECS[codec], license, log).run()
             part.replace(target)
         except OSError as error:
             raise DatasetError(f"cannot write '{target}': {reason(error)}") from error
@@ -107,36 +124,15 @@ def export(
             shutil.rmtree(part, ignore_errors=True)
 
 
-def _check(file: h5py.File, source: Path) -> None:
-    """Raise `ExportError` for data that LeRobot's formats cannot store."""
-    if file.attrs["format"] != "ligature dataset 2":
-        raise DatasetError(
-            f"'{source}' has the format '{file.attrs['format']}'; only 'ligature dataset 2' can be exported"
-        )
-    rate, names = float(file.attrs["rate"]), episode_names(file)
-    if rate != round(rate):
-        raise DatasetError(f"'{source}' has {rate:g} samples a second; record it again with a whole number")
-    if not names:
-        raise DatasetError(f"'{source}' has no episode; record one to its end")
-    if not Robot.of(file).arms:
-        raise DatasetError(f"'{source}' has no arm with a jaw, whose motion would be state and action; add a PSM")
-    for name in names:
-        if int(file[name].attrs["samples"]) < 2:
-            raise DatasetError(f"'{source}': {name} has fewer than 2 samples; record longer, or more samples a second")
-        for camera, pictures in file[name].get("cameras", {}).items():
-            height, width = pictures["rgb"].shape[1:3]
-            if height % 2 or width % 2:
-                even = f"{width - width % 2}x{height - height % 2}"
-                raise DatasetError(
-                    f"'{source}': pictures of {camera} are {width}x{height}; videos need even sizes, such as {even}"
-                )
-
-
 class _Export:
-    """One export into the folder ``root``."""
+    """One export of the episodes ``names`` into the folder ``root``."""
 
-    def __init__(self, file: h5py.File, root: Path, format: str, codec: Codec, license: str, log: Log) -> None:
+    def __init__(
+        self, file: h5py.File, names: Sequence[str], root: Path, format: str, codec: Codec, license: str, log: Log
+    ) -> None:
         self._file, self._root, self._codec, self._license, self._log = file, root, codec, license, log
+        self._names, self._splits = _in_splits(file, names)
+        self._types = types_of_extras([file[name] for name in names])
         self._new, self._fps = format == "lerobot-3.0", round(float(file.attrs["rate"]))
         self._written = _Written()
         self._tables = GrowingTables(self._data_path, DATA_MEGABYTES << 20 if self._new else 0)
@@ -157,26 +153,27 @@ class _Export:
 
     def run(self) -> None:
         """Write everything."""
-        ordered, splits = _in_splits(self._file)
-        self._constant = self._find_constant(ordered)
-        for number, name in enumerate(ordered):
+        self._constant = self._find_constant(self._names)
+        for number, name in enumerate(self._names):
             self._add(number, name)
-            self._log(f"{name}: {self._written.episodes[-1]['length']} samples")
+            off = pace(self._file[name]["time"][:], self._fps).off
+            late = f", up to {1e3 * off:.3g} ms off the rate" if off > EXACT else ""
+            self._log(f"{name}: {self._written.episodes[-1]['length']} samples{late}")
         self._tables.close()
         meta = self._root / "meta"
         meta.mkdir(exist_ok=True)
-        info = self._info(splits)
-        (meta / "info.json").write_text(json.dumps(info, indent=4), encoding="utf-8")
-        (meta / "calibration.json").write_text(json.dumps(self._calibration(), indent=1), encoding="utf-8")
+        info = self._info(self._splits)
+        (meta / "info.json").write_text(json_of(info, 4), encoding="utf-8")
+        (meta / "calibration.json").write_text(json_of(self._calibration(), 1), encoding="utf-8")
         write_lines(meta / "events.jsonl", self._written.events)
         self._write_meta(meta)
-        text = card(self._file, info, ordered, self._constant, self._license)
+        text = card(self._file, info, self._names, self._constant, self._license)
         (self._root / "README.md").write_text(text, encoding="utf-8")
         if not self._new:
             (meta / "README.md").write_text(text, encoding="utf-8")
 
     def _columns(self, episode: h5py.Group) -> Iterator[Column]:
-        return columns(self._file, episode, texts=not self._new)
+        return columns(self._file, episode, not self._new, self._types)
 
     def _find_constant(self, names: Sequence[str]) -> list[str]:
         """Features that are constant over all samples: they carry no information and have no scale to normalise by."""
@@ -302,7 +299,7 @@ class _Export:
             write_lines(meta / "episodes.jsonl", written.episodes)
             numbered = enumerate(written.stats)
             write_lines(meta / "episodes_stats.jsonl", [{"episode_index": k, "stats": each} for k, each in numbered])
-        (meta / "stats.json").write_text(json.dumps(self._all_stats(), indent=1), encoding="utf-8")
+        (meta / "stats.json").write_text(json_of(self._all_stats(), 1), encoding="utf-8")
 
     def _all_stats(self) -> dict[str, statistics.Statistics]:
         """Statistics of all features: of numbers over all samples, of pictures combined from those of the episodes."""
@@ -329,17 +326,16 @@ class _Export:
                 name: {key: camera[key][0].tolist() if key in camera else None for key in ("pose", "intrinsics")}
                 for name, camera in self._file[episode].get("cameras", {}).items()
             }
-            for episode in _in_splits(self._file)[0]
+            for episode in self._names
         ]
         return {"poses": "x y z qx qy qz qw in world axes, metres", "arms": arms, "episodes": cameras}
 
 
-def _in_splits(file: h5py.File) -> tuple[list[str], dict[str, str]]:
+def _in_splits(file: h5py.File, names: Sequence[str]) -> tuple[list[str], dict[str, str]]:
     """Names of the episodes in the order in which they are written, and the ranges that the splits are.
 
     Successes come first, for training, validation and testing, then failures, then what nothing judged.
     """
-    names = episode_names(file)
     judged = {name: bool(file[name].attrs.get("judged", True)) for name in names}
     done = [name for name in names if judged[name] and file[name].attrs["success"]]
     failed = [name for name in names if judged[name] and not file[name].attrs["success"]]

@@ -5,7 +5,7 @@ Joints in radians and metres, poses x y z qx qy qz qw in the base of the arm (``
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 from ligature.model.frames import pose7_matrix
 from ligature.robots.poses import rotation_vector
 
+EXTRA = "extra."
+"""What names of features begin with that are the caller's arrays."""
+
 POSE, TURN = ("x", "y", "z", "qx", "qy", "qz", "qw"), ("x", "y", "z", "rx", "ry", "rz")
+STATE = "environment_state"
+"""The caller's array that LeRobot knows: an input of policies, of single precision as the others."""
+
 WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
 
 
@@ -58,15 +64,34 @@ class Robot:
         return tuple(f"{arm}_{part}" for arm in self.arms for part in parts)
 
 
-def columns(file: h5py.File, episode: h5py.Group, texts: bool) -> Iterator[Column]:
-    """The features of an episode in LeRobot's terms; ``texts`` adds those of words, for each sample."""
+def types_of_extras(episodes: Sequence[h5py.Group]) -> dict[str, str]:
+    """Types of the caller's arrays, by their names, that hold the numbers of all ``episodes``."""
+    found: dict[str, list[Any]] = {}
+    for episode in episodes:
+        for name, array in episode.get("extra", {}).items():
+            found.setdefault(name, []).append(array.dtype)
+    return {name: "float32" if name == STATE else _type(np.result_type(*each)) for name, each in found.items()}
+
+
+def _type(dtype: np.dtype[Any]) -> str:
+    """The type of a feature for numbers of a type."""
+    if dtype.kind == "f":
+        return "float64" if dtype.itemsize > np.dtype(np.float32).itemsize else "float32"
+    return "bool" if dtype.kind == "b" else "int64"
+
+
+def columns(file: h5py.File, episode: h5py.Group, texts: bool, types: Mapping[str, str]) -> Iterator[Column]:
+    """The features of an episode in LeRobot's terms.
+
+    ``texts`` adds those of words, for each sample; ``types`` are those of the caller's arrays, by their names.
+    """
     robot = Robot.of(file)
     arms = [episode[f"arms/{name}"] for name in robot.arms]
     n = int(episode.attrs["samples"])
     yield from _core(robot, arms)
     yield from _more(robot, arms)
     yield from _ground_truth(episode)
-    yield from _extra(episode)
+    yield from _extra(episode, types)
     yield Column("label.phase", ("phase",), episode["phase"][:][:, None], "int64")
     for what in ("phase", "activity"):
         values = np.stack([arm[what][:] for arm in arms], axis=1)
@@ -132,12 +157,12 @@ def _ground_truth(episode: h5py.Group) -> Iterator[Column]:
         yield Column("ground_truth.thread_tension", tuple(map(str, elements)), tension)
 
 
-def _extra(episode: h5py.Group) -> Iterator[Column]:
+def _extra(episode: h5py.Group, types: Mapping[str, str]) -> Iterator[Column]:
     """Columns that the caller added, of which LeRobot knows ``observation.environment_state``."""
     for name, data in sorted(episode.get("extra", {}).items()):
-        values = data[:].reshape(len(data), -1)
-        feature = "observation.environment_state" if name == "environment_state" else f"extra.{name}"
-        yield Column(feature, tuple(map(str, range(values.shape[1]))), values)
+        values = data[:].reshape(len(data), -1).astype(types[name])
+        feature = f"observation.{STATE}" if name == STATE else f"{EXTRA}{name}"
+        yield Column(feature, tuple(map(str, range(values.shape[1]))), values, types[name])
 
 
 def _motors(arms: Sequence[h5py.Group], name: str, row: int) -> NDArray[Any]:

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 
 from ligature.datasets.lerobot.features import Column
 
-_TYPES = {"float32": pa.float32(), "int64": pa.int64(), "bool": pa.bool_(), "string": pa.string()}
+_TYPES = {
+    "float32": pa.float32(),
+    "float64": pa.float64(),
+    "int64": pa.int64(),
+    "bool": pa.bool_(),
+    "string": pa.string(),
+}
 
 
 def table_of(columns: Sequence[Column], counters: Mapping[str, NDArray[Any]]) -> pa.Table:
@@ -91,4 +97,9 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 def write_lines(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Rows as lines of JSON."""
-    path.write_text("".join(f"{json.dumps(row)}\n" for row in rows), encoding="utf-8")
+    path.write_text("".join(f"{json_of(row)}\n" for row in rows), encoding="utf-8")
+
+
+def json_of(value: Any, indent: int | None = None) -> str:
+    """JSON, which has no infinite numbers: ValueError for those, and for what is none."""
+    return json.dumps(value, indent=indent, allow_nan=False)
