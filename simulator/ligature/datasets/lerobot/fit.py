@@ -11,7 +11,7 @@ import numpy as np
 from ligature.datasets.lerobot.features import STATE, Robot
 from ligature.datasets.quality import not_finite, pace
 from ligature.datasets.soundness import episode_names
-from ligature.datasets.store import MOST_NAMED, DatasetError
+from ligature.datasets.store import DatasetError
 from ligature.paths import printable
 
 SHORTEST = 2
@@ -38,12 +38,19 @@ def check(file: h5py.File, source: Path, out: Mapping[str, str]) -> None:
     if rate != round(rate):
         raise DatasetError(f"'{source}' has {rate:g} samples a second; record it again with a whole number")
     if not names:
-        each = "; ".join(f"{printable(name)}: {why}" for name, why in list(out.items())[:MOST_NAMED])
-        raise DatasetError(f"'{source}' has no episode to export; {each or 'record one to its end'}")
+        raise DatasetError(f"'{source}' has no episode to export; {_why(out) or 'record one to its end'}")
     if not Robot.of(file).arms:
         raise DatasetError(f"'{source}' has no arm with a jaw, whose motion would be state and action; add a PSM")
     for name in names:
         _check_episode(file[name], f"'{source}': {name}", rate)
+
+
+def _why(out: Mapping[str, str]) -> str:
+    """Why the first of the episodes that are left ``out`` is, and how many others are."""
+    if not out:
+        return ""
+    name, why = next(iter(out.items()))
+    return f"{printable(name)}: {why}" + (f" (and {len(out) - 1} more)" if len(out) > 1 else "")
 
 
 def _check_episode(episode: h5py.Group, name: str, rate: float) -> None:
