@@ -108,3 +108,8 @@ def test_the_record_of_a_run_becomes_a_sound_dataset(tmp_path: Path) -> None:
     console = Console(file=io.StringIO(), soft_wrap=True)
     assert replay(record, None, "", 1.0, console, dataset) == 0, console.file.getvalue()  # type: ignore[attr-defined]
     sound(dataset.path, tmp_path)
+    faster = Sampled(tmp_path / "faster.h5", Sampling(600.0, (64, 48), ()))
+    assert replay(record, None, "", 1.0, console, faster) == 1
+    printed = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "--rate is 600, and the run has 500 updates a second; give at most that" in printed
+    assert not faster.path.exists()

@@ -47,6 +47,11 @@ class _Sampler:
 
     def _begin(self, simulation: ligature.Simulation) -> None:
         given, sampling = self._dataset, self._dataset.sampling
+        most = 1.0 / (simulation.dt * simulation.ticks_per_update)
+        if sampling.rate > most * (1.0 + 1e-9):
+            raise ValueError(
+                f"--rate is {sampling.rate:g}, and the run has {most:g} updates a second; give at most that"
+            )
         self._attempt = Attempt(simulation.scene, self._task) if self._task else None
         self._activities = ActivityWatch(simulation.scene)
         writer = DatasetWriter(
