@@ -295,6 +295,7 @@ def test_a_writer_that_closes_keeps_what_can_be_read_and_names_the_rest_once(
         with h5py.File(episode_folder(path) / "episode_0001.h5", "r+") as file:
             file.attrs["success"] = "yes"
     assert str(raised.value).count("attribute 'success' of 'episode_0001'") == 1
+    assert "stay in" in str(raised.value) and "2 episodes are whole" in str(raised.value)
     with opened(path) as file:
         assert episode_names(file) == ["episode_0000", "episode_0002"]
     assert [place.name for place in episode_folder(path).iterdir()] == ["episode_0001.h5"]

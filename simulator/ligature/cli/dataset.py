@@ -65,7 +65,7 @@ def join_episodes(file: Path, console: Console) -> int:
     def run(bad: dict[str, str]) -> None:
         _printer(console)(f"{file}: {counted(join(file, bad), 'episode')} in one file")
         if bad:
-            raise DatasetError(f"{invalid(file, bad)}; their files stay where they are")
+            raise DatasetError(f"{invalid(file, bad)}; they stay where they are")
 
     return _reported(run, file, console)
 

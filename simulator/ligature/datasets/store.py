@@ -165,7 +165,7 @@ class EpisodeStore:
         if self.count or empty:
             self._link()
             bad: dict[str, str] = {}
-            join(self._path, bad)
+            self.count = join(self._path, bad)
             self._joined = True
             if bad:
                 raise DatasetError(f"{invalid(self._path, bad)}; the files of these episodes stay in '{self._folder}'")
@@ -207,10 +207,11 @@ def join(path: Path, bad: dict[str, str] | None = None) -> int:
             at = f" ({copying})" if copying else ""
             raise DatasetError(f"cannot join the episodes of '{path}'{at}: {error}; they stay in '{folder}'") from error
         raise
-    for name in names:
-        (folder / f"{name}.h5").unlink(missing_ok=True)
     if not found:
         shutil.rmtree(folder, ignore_errors=True)
+    for name in names if found else ():
+        with suppress(OSError):
+            (folder / f"{name}.h5").unlink()
     return len(names)
 
 
