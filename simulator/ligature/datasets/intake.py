@@ -144,7 +144,8 @@ def _numbers(name: str, value: object) -> NDArray[Any]:
     if numbers.dtype.kind != "f":
         return numbers
     if numbers.dtype.itemsize > np.dtype(float).itemsize:
-        numbers = numbers.astype(float)
+        with np.errstate(over="ignore"):
+            numbers = numbers.astype(float)
     if not np.isfinite(numbers).all():
         place = np.argwhere(~np.isfinite(numbers))[0].tolist()
         raise ValueError(
