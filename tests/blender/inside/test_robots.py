@@ -117,7 +117,7 @@ def test_a_chain_of_blender_goes_out_with_its_meshes_and_what_is_lost_is_listed(
             place = link.T @ touched.T_link
             np.testing.assert_allclose(place[:3, 3], (rest_pose(obj) @ relative_pose(obj, child))[:3, 3], atol=1e-4)
     report = bpy.data.texts["Converted Robot"].as_string()
-    assert "1 ghost objects are left out" in report and "1 sensors are left out" in report
+    assert "1 ghost object is left out" in report and "1 sensor is left out" in report
     for joint in joints:
         kind = joint.adf.joint.type
         found = next((j for j in robot.joints if j.name == joint.name.replace(" ", "_")), None)
