@@ -11,11 +11,12 @@ import gymnasium
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ligature.bundle import SCENES
 from ligature.environments import Randomisation, SuturingEnv
 from ligature.environments.experts import EXPERTS
+from ligature.environments.goals import GOALS
 from ligature.environments.hand import Hand
 from ligature.environments.randomisation import BOUNDS, PHYSICS, Drawn, things_of
 from ligature.environments.variation import Channel, varied
@@ -315,6 +316,53 @@ def test_experts_do_their_task_in_other_worlds() -> None:
         done.append(info["is_success"])
     env.close()
     assert sum(done) >= 3, done
+
+
+WITH_NEEDLES = sorted(task for task, goal in GOALS.items() if goal.scene != "ligating" and task != "peg_transfer")
+
+
+@settings(max_examples=12, deadline=None)
+@given(task=st.sampled_from(WITH_NEEDLES), size=st.floats(0.8, 1.2), seed=st.integers(0, 2**31))
+@example(task="insert", size=0.85, seed=0)
+@example(task="suture", size=0.9, seed=1)
+@example(task="hand_over", size=0.8, seed=2)
+@example(task="insert", size=0.8, seed=0)
+def test_a_needle_of_any_size_is_in_the_hand_that_the_task_says_or_the_reset_is_refused(
+    task: str, size: float, seed: int
+) -> None:
+    """Before, hands held small needles beyond their end, or by the thread, and episodes were lost as they began."""
+    env = SuturingEnv(task, randomise={"needle_size": [size, size]})
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("ligature.environments.suturing.TRIES", 2)
+            _, info = env.reset(seed=seed)
+    except ValueError as error:
+        assert size < 0.92 and "no episode can begin in 2 draws: PSM2 has no grasp of the needle" in str(error)
+    else:
+        grasping = [number for number in range(len(env.arms)) if env.goal.holds(number)]
+        assert grasping == ([] if env.goal.grasping is None else [env.goal.grasping]) and not info["lost"]
+        for _ in range(6):
+            *_, info = env.step(np.zeros(env.action_space.shape))
+            assert not info["lost"]
+    finally:
+        env.close()
+
+
+def test_what_cannot_begin_is_drawn_again() -> None:
+    """Needles that are too short for the throw are in the range; a grasp that is lost as an episode begins counts too."""
+    env = SuturingEnv("insert", randomise={"needle_size": [0.8, 0.9]})
+    sizes = [env.reset(seed=seed)[1]["randomisation"]["needle_size"] for seed in range(4)]
+    env.close()
+    assert all(0.83 < size <= 0.9 for size in sizes)
+    plain = SuturingEnv("insert")
+    plain.goal.grasping = None
+    with pytest.raises(ValueError, match="no episode can begin in 20 draws: the jaws of PSM2 hold Needle"):
+        plain.reset(seed=1)
+    with pytest.raises(RuntimeError, match="no episode has begun"):
+        plain.step(np.zeros(7))
+    plain.goal.grasping = 0
+    assert plain.reset(seed=1)[0][49] == 1.0
+    plain.close()
 
 
 def test_gymnasium_makes_them_and_vectors_take_them() -> None:

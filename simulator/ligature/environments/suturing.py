@@ -5,7 +5,7 @@ Metres, radians, world axes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cache
@@ -187,7 +187,8 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         self.observation_space: spaces.Space[Any] = {"image": image, "state": state, "both": both}[observation]
         self._drawn: Drawn | None = None
         self._channel: Channel | None = None
-        self._dressed, self._count, self._closed = True, 0, False
+        self._dressed, self._count, self._episodes, self._closed = True, 0, 0, False
+        self._refused, self._bounded = "", False
         self._progress: Progress | None = None
         self._build(self._scene)
 
@@ -306,10 +307,19 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         """Pose (7,) of the tip in the arm's base that is asked for; Cartesian actions are added to it."""
         return np.array(self._readings[0].setpoint)
 
+    def true_state(self) -> Array:
+        """The numbers of ``observation="state"`` as they are, without noise or delay, whatever is observed.
+
+        Raises RuntimeError before `reset` and after `close`.
+        """
+        self._begun("true_state()")
+        return self._state()
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; ``seed`` begins another series of random starts.
 
-        Raises ValueError for any of ``options``: there are none.
+        Raises ValueError for any of ``options``: there are none. Also where no episode can begin in `TRIES` draws, such
+        as where no jaws hold a needle that they should.
         """
         if options:
             raise ValueError(
@@ -317,29 +327,44 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
             )
         self._check_open()
         super().reset(seed=seed)
-        if self._randomisation is not None:
-            self._vary(self._randomisation)
+        self._progress = None
+        self._progress = self._draw_start()
+        self._count, self._refused, self._bounded = 0, "", False
+        self._episodes += 1
+        drawn = {} if self._drawn is None else {"randomisation": self.randomisation}
+        return self._seen(), {**self._info(), **drawn}
+
+    def _draw_start(self) -> Progress:
+        """Draw what this episode has and where it begins, again where it cannot begin so; returns how it stands."""
+        draw = self._drawing()
+        for _ in range(TRIES):
+            try:
+                draw()
+                return self._start()
+            except ValueError as error:
+                why = error
+        raise ValueError(f"no episode can begin in {TRIES} draws: {why}") from why
+
+    def _drawing(self) -> Callable[[], None]:
+        """What draws the world of this episode; without ranges it stays as it is."""
+        ranges = self._randomisation
+        if ranges is None:
+            return lambda: None
+        rng = np.random.default_rng(int(self.np_random.integers(2**62)))
+        return lambda: self._take(ranges.draw(self._scene, rng))
+
+    def _start(self) -> Progress:
+        """Begin an episode; ValueError where it does not begin as the task has it."""
         starts = self._goal.starts
         self._settle(int(self.np_random.integers(starts)) if starts > 1 else 0)
         if self._drawn is not None:
             place(self._simulation, self._drawn)
         self._goal.begin(self.np_random)
-        self._count = 0
-        self._progress = self._goal.observe()
-        drawn = {} if self._drawn is None else {"randomisation": self.randomisation}
-        return self._seen(), {**self._info(), **drawn}
-
-    def _vary(self, ranges: Randomisation) -> None:
-        """Draw what this episode has, and simulate its start where that is another one."""
-        rng = np.random.default_rng(int(self.np_random.integers(2**62)))
-        for tries in range(TRIES):
-            try:
-                self._take(ranges.draw(self._scene, rng))
-            except ValueError as error:
-                if tries == TRIES - 1:
-                    raise ValueError(f"no episode can begin in {TRIES} draws of these ranges: {error}") from error
-            else:
-                break
+        self._goal.check_start()
+        begun = self._goal.observe()
+        if begun.ended:
+            raise ValueError(f"it is over as it begins: {begun.lost or 'the task is done'}")
+        return begun
 
     def _take(self, drawn: Drawn) -> None:
         """Make ``drawn`` what this episode has."""
@@ -356,25 +381,20 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         After the task is done or lost the world goes on, but nothing is paid any more. Raises ValueError for what is no
         action, RuntimeError before `reset` and after `close`.
         """
-        self._check_open()
-        if self._progress is None:
-            raise RuntimeError("no episode has begun: call reset() before step()")
+        before = self._begun("step()")
         wanted = self._numbers_of(action)
         if self._channel is not None:
             wanted = self._channel.act(wanted)
         answers = [hand.act(wanted[layout.ACTION * k : layout.ACTION * (k + 1)]) for k, hand in enumerate(self._hands)]
         self._simulation.step(self._ticks)
         self._count += 1
-        before = self._progress
-        if not before.ended:
-            self._progress = self._goal.observe()
+        self._progress = before if before.ended else self._goal.observe()
         left, done, lost = self._progress
         reward = SUCCESS_REWARD * (done and not before.done) + (100.0 * (before.left - left) if self._dense else 0.0)
         cut = self._most is not None and self._count >= self._most
-        rejected, bounded = "; ".join(filter(None, (text for text, _ in answers))), any(held for _, held in answers)
-        return self._seen(), float(reward), done or bool(lost), cut, {
-            **self._info(), "refused": rejected, "bounded": bounded,
-        }  # fmt: skip
+        self._refused = "; ".join(filter(None, (text for text, _ in answers)))
+        self._bounded = any(bounded for _, bounded in answers)
+        return self._seen(), float(reward), done or bool(lost), cut, self._info()
 
     def _numbers_of(self, action: Any) -> Array:
         """An action as numbers from -1 to 1."""
@@ -387,6 +407,13 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         if self._closed:
             raise RuntimeError("the environment is closed: make another one")
 
+    def _begun(self, call: str) -> Progress:
+        """How the episode stands."""
+        self._check_open()
+        if self._progress is None:
+            raise RuntimeError(f"no episode has begun: call reset() before {call}")
+        return self._progress
+
     # --- keeping a moment -------------------------------------------------------------------
 
     def save(self) -> EnvState:
@@ -396,11 +423,9 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         last bits as all that are restored from it, and with others than one that was never saved. Raises RuntimeError
         before the first `reset`.
         """
-        self._check_open()
-        if self._progress is None:
-            raise RuntimeError("no episode has begun: call reset() before save()")
+        progress = self._begun("save()")
         return EnvState(
-            self._options, self._simulation.snapshot(), self._goal.snapshot(), self._progress, self._count,
+            self._options, self._simulation.snapshot(), self._goal.snapshot(), progress, self._count,
             deepcopy(self.np_random.bit_generator.state), self._drawn, deepcopy(self._channel),
         )  # fmt: skip
 
@@ -446,6 +471,10 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         return self._numbers() if self._observation == "state" else self._picture(self._size)
 
     def _numbers(self) -> Array:
+        found = self._state()
+        return found if self._channel is None else self._channel.sense(found)
+
+    def _state(self) -> Array:
         """The state, as the table of the class has it."""
         assert self._progress is not None
         state, goal = self._simulation.state, self._goal
@@ -457,12 +486,15 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         write_on_side(state["body_pose"][0, self.needle], self._side, found[layout.POSE])
         found[layout.TWIST] = state["body_twist"][0, self.needle]
         found[layout.TARGET], found[layout.LEFT], found[layout.MARKS] = goal.target(), self._progress.left, goal.marks()
-        return found if self._channel is None else self._channel.sense(found)
+        return found
 
     def _info(self) -> dict[str, Any]:
         assert self._progress is not None
         left, done, lost = self._progress
-        info = {"distance": left, "is_success": done, "lost": lost, "sim_time": self._simulation.time}
+        info = {
+            "distance": left, "is_success": done, "lost": lost, "sim_time": self._simulation.time,
+            "refused": self._refused, "bounded": self._bounded,
+        }  # fmt: skip
         if self._simulation.scene.tissues:
             state = self._simulation.state
             info["tissue_force"] = float(np.linalg.norm(state["tissue_wrench"][0, 0, :3]))

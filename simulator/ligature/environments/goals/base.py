@@ -30,6 +30,9 @@ START = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
 EARLY = 1e-9
 """Seconds that a time may fall short of what is wanted, for the rounding of simulated time."""
 
+BASE = 0.0001
+"""Metres that a place where jaws hold a needle is at least from its base, where its thread begins."""
+
 UNDONE = 1e-6
 """Metres that are left while a task is not done, wherever the needle is."""
 
@@ -109,6 +112,8 @@ class Goal:
         Actions until an episode of a registered environment is cut.
     starts
         Settled starts, of which each episode draws one.
+    grasping
+        Number of the arm whose jaws hold the body as an episode begins; None where none do.
     """
 
     body: int
@@ -120,6 +125,7 @@ class Goal:
     text: str
     steps: int = 200
     starts: int = 1
+    grasping: int | None = None
 
     _KEPT: tuple[str, ...] = ()
     """Attributes that last from action to action."""
@@ -145,6 +151,14 @@ class Goal:
     def begin(self, rng: np.random.Generator) -> None:
         """Set an episode up."""
         raise NotImplementedError
+
+    def check_start(self) -> None:
+        """Raise ValueError where an episode that has begun does not have the body in the jaws of `grasping` alone."""
+        name = self._simulation.scene.bodies[self.body].identity.name
+        for number, arm in enumerate(self._arms):
+            if self.holds(number) != (number == self.grasping):
+                what = "do not hold" if number == self.grasping else "hold"
+                raise ValueError(f"the jaws of {arm.name} {what} {name}")
 
     def target(self) -> Array:
         """Where something is wanted (3,), world axes."""
@@ -220,8 +234,13 @@ def take_in_hand(simulation: Simulation, arm: PsmArm, needle: int, arc: NeedleAr
         arm.jaw.servo_jp([opening])
         simulation.step(5)
     simulation.step(200)
-    if simulation.grasps[arm.name] is None:
+    if not holds(simulation, arm, needle):  # they may hold its thread
         raise ValueError(f"the jaws of {arm.name} do not hold the needle")
+
+
+def on_needle(depths: Sequence[float], arc: NeedleArc) -> list[float]:
+    """``depths`` from the tip of a needle; those that a short needle does not have are at its base."""
+    return sorted({min(depth, arc.length - BASE) for depth in depths})
 
 
 def aside(arm: PsmArm, rng: np.random.Generator, shift: float, turn: float) -> Array:

@@ -21,6 +21,7 @@ from ligature.environments.goals.base import (
     Progress,
     aside,
     base_of,
+    on_needle,
     take_in_hand,
 )
 from ligature.model.frames import inverse, pose7_matrix
@@ -45,6 +46,7 @@ class Insert(Goal):
     scene: str = "suturing"
     arms: tuple[str, ...] = ("PSM2",)
     models: tuple[int, ...] = (0, 1, 4, 5)
+    grasping = 0
     DEPTHS = (0.020, 0.0205, 0.021)
     BEFORE, MORE, LOOK = 0.4, 0.1, 0.15
     SHIFT, TURN = 0.002, 0.08
@@ -64,7 +66,7 @@ class Insert(Goal):
         self._last = self.throw.towards_exit + RECOMMENDED_AXIAL / self.arc.radius + self.MORE
         T_base = base_of(simulation, arm)
         way = [self.throw.arc_at(a, self.arc) for a in np.linspace(-self.BEFORE, self._last, 12)]
-        grasp = best_grasp(self.arc, self.DEPTHS, arm.kinematics, T_base, way, way[0], entry)
+        grasp = best_grasp(self.arc, on_needle(self.DEPTHS, self.arc), arm.kinematics, T_base, way, way[0], entry)
         if grasp is None:
             raise ValueError(f"{arm.name} has no grasp of the needle that reaches the whole throw")
         self._first = way[0], inverse(T_base) @ way[0] @ grasp.tool_in_arc(self.arc)

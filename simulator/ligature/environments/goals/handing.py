@@ -17,6 +17,7 @@ from ligature.environments.goals.base import (
     Progress,
     aside,
     base_of,
+    on_needle,
     put,
     take_in_hand,
 )
@@ -39,6 +40,7 @@ class HandOver(Goal):
     holes = 1
     text = "hand the needle over from the first arm to the second"
     scene, arms, models, steps = "suturing", ("PSM1", "PSM2"), (0, 1, 2, 3, 4, 5), 300
+    grasping = GIVER
     GIVEN, TAKEN = (0.003, 0.004, 0.005), (0.020, 0.0205, 0.021)
     """Metres from the needle's tip at which the giver holds it, and the taker shall."""
     MEETING, BEFORE, BEYOND = 0.03, 0.4, 0.5
@@ -67,7 +69,7 @@ class HandOver(Goal):
             raise ValueError(f"{giver.name} cannot hold the needle where it is handed over")
         self._first = meeting, inverse(T_base) @ meeting @ grasp.tool_in_arc(self.arc)
         self._along = self._on_needle(np.linspace(0.0, self.arc.length, 9))
-        self._hold = self._on_needle(np.array(self.TAKEN[:1]))[0]
+        self._hold = self._on_needle(np.array(on_needle(self.TAKEN[:1], self.arc)))[0]
 
     def _on_needle(self, depths: Array) -> Array:
         """The places (n, 3) of the needle, in its body frame, that are ``depths`` (n,) from its tip."""
@@ -86,7 +88,7 @@ class HandOver(Goal):
         angles = np.linspace(-self.BEFORE, self.throw.towards_exit + self.BEYOND, 12)
         way = [self.throw.arc_at(float(angle), self.arc) for angle in angles]
         base = base_of(self._simulation, taker)
-        found = best_grasp(self.arc, self.TAKEN, taker.kinematics, base, way, now, self.surface)
+        found = best_grasp(self.arc, on_needle(self.TAKEN, self.arc), taker.kinematics, base, way, now, self.surface)
         if found is None:
             raise ValueError(f"{taker.name} has no grasp of the needle that reaches the whole throw")
         return found.tool_in_arc(self.arc)

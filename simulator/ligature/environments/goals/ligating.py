@@ -28,7 +28,7 @@ DEEP = 0.0075
 class Ligating(Goal):
     """A task with the thread of the scene `ligating`; episodes begin with its long end in the first arm's jaws."""
 
-    scene, arms, models = "ligating", ("PSM1", "PSM2"), (0, 1, 2, 3, 4)
+    scene, arms, models, grasping = "ligating", ("PSM1", "PSM2"), (0, 1, 2, 3, 4), RIGHT
     LOOP = 0.05
     """Metres that are left at most for a loop that is not closed."""
     SLACK, TOUCHING = 0.008, 2.0
