@@ -17,6 +17,7 @@ from ligature.cli.evaluate import evaluate
 from ligature.cli.main import app
 from ligature.environments import SuturingEnv
 from ligature.environments.evaluation import Episode, run_episode, run_episodes, summary
+from ligature.environments.goals import GOALS
 from ligature.environments.policies import PolicyError, checked, load_policy
 from ligature.render import RenderUnavailable
 from rich.console import Console
@@ -86,6 +87,33 @@ def test_an_episode_is_measured_as_the_environment_tells_it(env: SuturingEnv, ne
 
 def test_experts_are_policies_and_go_on_where_they_end(env: SuturingEnv) -> None:
     assert all(e.success for e in run_episodes("expert", {"task": "reach"}, range(3), 200))
+
+
+def first_actions(task: str, **options: Any) -> Episode:
+    """What the expert does at the start of an episode."""
+    env = SuturingEnv(task, size=(8, 6), max_steps=None, **options)
+    found = run_episode(env, load_policy("expert"), 3, 12)
+    env.close()
+    return found
+
+
+@pytest.mark.parametrize("task", sorted(GOALS))
+def test_an_expert_acts_by_the_ground_truth_whatever_is_observed(task: str) -> None:
+    """Before, it did nothing where pictures are observed, and `pick` raised TypeError."""
+    expected = first_actions(task)
+    assert expected.path_length > 1e-3
+    assert first_actions(task, observation="image") == expected == first_actions(task, observation="both")
+
+
+@pytest.mark.parametrize("task", ["reach", "pick"])
+def test_neither_noise_nor_delay_misleads_an_expert(task: str) -> None:
+    noisy = {"position_noise": [0.02, 0.02], "observation_delay": [5, 5]}
+    assert first_actions(task, randomise=noisy) == first_actions(task, randomise={})
+
+
+def test_an_expert_succeeds_where_only_pictures_are_observed() -> None:
+    options = {"task": "reach", "observation": "image", "size": (8, 6)}
+    assert all(e.success for e in run_episodes("expert", options, range(3), 200))
 
 
 def test_processes_change_nothing(network: Path) -> None:

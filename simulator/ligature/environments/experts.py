@@ -45,7 +45,7 @@ Act = Callable[[Array], NDArray[Any]]
 """The action of a policy for an observation."""
 
 Policy = Callable[[Hand, Array], Iterator[Array]]
-"""Actions of an episode, from the first arm and the first observation; each when what came of the last one is seen."""
+"""Actions of an episode, from the first arm and the state at its start; each when what came of the last one is seen."""
 
 
 def reach(hand: Hand, observation: Array) -> Iterator[Array]:
@@ -143,7 +143,7 @@ def demonstrate(
     Parameters
     ----------
     env
-        With state observations.
+        Where it is done; the expert sees its ground truth, whatever is observed.
     seed
         Of the reset and of the disturbance.
     noise
@@ -171,7 +171,7 @@ def demonstrate(
     noise *= float(rng.uniform())
     disturbance = np.zeros(action_width(len(env.arms)))
     slipping = _slipping(seed) if slips and env.task in GRASPING else repeat(False)
-    for action in EXPERTS[env.task](Hand(env), observation):
+    for action in EXPERTS[env.task](Hand(env), env.true_state()):
         look(observation, action)
         if act is None:
             disturbance = 0.9 * disturbance + noise * rng.standard_normal(disturbance.shape)

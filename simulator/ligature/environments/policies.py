@@ -6,7 +6,7 @@ import importlib
 import importlib.util
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -56,18 +56,15 @@ def load_policy(name: str) -> Policy:
 
 
 def _expert(env: SuturingEnv, seed: int) -> Act:
-    """The scripted expert of the task; what it leaves over is spent standing still."""
-    task = env.task
+    """The scripted expert of the task, which sees the ground truth; what it leaves over is spent standing still."""
     if env.action != "cartesian":
         raise PolicyError("experts act with action='cartesian'")
-    hand, still = Hand(env), np.zeros(env.action_space.shape or (), dtype=np.float32)
-    actions: list[Iterator[NDArray[Any]]] = []
+    actions = EXPERTS[env.task](Hand(env), env.true_state())
+    still = np.zeros(env.action_space.shape or (), dtype=np.float32)
 
     def act(observation: Any) -> NDArray[Any]:
-        if not actions:
-            actions.append(EXPERTS[task](hand, observation["state"] if isinstance(observation, dict) else observation))
         try:
-            return next(actions[0], still)
+            return next(actions, still)
         except ValueError:  # the needle lies where it cannot be grasped: an episode that the expert loses
             return still
 
