@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import errno
 import json
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,7 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ligature.cli.evaluate import evaluate
 from ligature.cli.main import app
@@ -140,7 +142,9 @@ def test_whatever_is_in_a_file_it_is_a_network_or_an_error(
         load_policy(str(path))
 
 
-@pytest.mark.parametrize("answer", [np.zeros(6), np.zeros((1, 7)), np.full(7, np.nan), None, "left", [0.0] * 8])
+@pytest.mark.parametrize(
+    "answer", [np.zeros(6), np.zeros((1, 7)), np.full(7, np.nan), None, "left", [0.0] * 8, [10**400] * 7, [[1], [1, 2]]]
+)
 def test_what_is_no_action_is_reported(answer: Any) -> None:
     with pytest.raises(PolicyError, match="an action is 7 finite numbers"):
         checked(answer)
@@ -275,8 +279,14 @@ def test_the_command_says_what_is_wrong(arguments: list[str], message: str) -> N
     [
         ("raise ValueError('no weights')", r"no policy '.*mine.py:policy': ValueError at .*mine.py:1: no weights"),
         ("def (", r"no policy '.*mine.py:policy': SyntaxError: invalid syntax \(mine.py, line 1\)"),
-        ("policy = lambda env, seed: 5", "a policy returns a function from observation to action, not 5"),
-        ("policy = lambda: None", r"the policy raised TypeError at .*takes 0 positional arguments"),
+        ("policy = lambda env, seed: 5", r"policy\(env, seed\) returns a function from observation to action; .* 5"),
+        ("policy = 5", r"'.*mine.py:policy' is not a function; policy\(env, seed\) returns a function"),
+        ("policy = lambda: None", r"is called with environment and seed: policy\(env, seed\) .*; this one takes \(\)"),
+        ("policy = lambda seen: None", r"policy\(env, seed\) returns a function .*; this one takes \(seen\)"),
+        ("policy = lambda env, seed: lambda: 0", r"which takes the observation; this one takes \(\)"),
+        ("raise SystemExit(0)", "no policy '.*': SystemExit at .*mine.py:1: 0"),
+        ("def policy(env, seed): raise SystemExit(0)", "the policy raised SystemExit at .*mine.py:1: 0"),
+        ("policy = lambda env, seed:\\\n lambda seen: exit()", "the policy raised SystemExit at .*sitebuiltins.*"),
         ("policy = lambda env, seed:\\\n lambda seen: 1 // 0", r"the policy raised ZeroDivisionError at .*mine.py:2: "),
     ],
 )
@@ -286,6 +296,75 @@ def test_what_a_users_code_raises_is_reported_with_its_place(
     (tmp_path / "mine.py").write_text(code)
     with pytest.raises(PolicyError, match=message):
         run_episode(env, load_policy(f"{tmp_path / 'mine.py'}:policy"), 1, 5)
+
+
+MISDEEDS: dict[str, Callable[[SuturingEnv], object]] = {
+    "closed the environment": SuturingEnv.close,
+    "closed the environment ": lambda env: env.simulation.close(),
+    "reset the environment": lambda env: env.reset(seed=1),
+    "stepped the environment": lambda env: env.step(np.ones(7)),
+    "restored another moment of the environment": lambda env: env.restore(env.kept),  # type: ignore[attr-defined]
+    "stepped the simulation": lambda env: env.simulation.step(),
+    "moved bodies of the simulation": lambda env: env.simulation.set_pose(
+        env.needle, np.array([0, 0, 0.1, 0, 0, 0, 1])
+    ),
+}
+
+
+@settings(max_examples=14, deadline=None)
+@given(what=st.sampled_from(sorted(MISDEEDS)), at=st.integers(-1, 5))
+@example("stepped the environment", -1)
+@example("reset the environment", 0)
+@example("restored another moment of the environment", 3)
+def test_what_a_policy_does_to_the_environment_is_found_whenever_it_does_it(what: str, at: int) -> None:
+    """Before, steps of its own were not counted, and what it reset was reported under other seeds."""
+    at = max(at, 1) if "restored" in what else at
+
+    def policy(env: SuturingEnv, seed: int) -> Any:
+        left = [at]
+        env.kept = env.save()  # type: ignore[attr-defined]
+
+        def act(observation: Any) -> Any:
+            if left[0] == 0:
+                MISDEEDS[what](env)
+            left[0] -= 1
+            return np.zeros(7)
+
+        if at < 0:
+            MISDEEDS[what](env)
+        return act
+
+    env = SuturingEnv("pick", max_steps=None)
+    with pytest.raises(
+        PolicyError, match=f"the policy {what.strip()}; it may only look at it, and try things in a copy"
+    ):
+        run_episode(env, policy, 4, 8)
+    env.close()
+
+
+@pytest.mark.parametrize("task", ["reach", "puncture"])
+def test_a_policy_may_look_and_try_things_in_a_copy(task: str) -> None:
+    def policy(env: SuturingEnv, seed: int) -> Any:
+        def act(observation: Any) -> Any:
+            trial = copy.deepcopy(env)
+            trial.step(np.ones(7))
+            trial.close()
+            return env.base_rotation.T @ (env.goal.target() - env.tool_position) @ np.ones((3, 7))
+
+        return act
+
+    env = SuturingEnv(task, max_steps=None)
+    assert run_episode(env, policy, 4, 3).steps == 3
+    env.close()
+
+
+def test_a_policy_that_exits_ends_the_command_with_an_error(tmp_path: Path) -> None:
+    """Before, its status was the command's: 0, and no output."""
+    (tmp_path / "mine.py").write_text("def policy(env, seed):\n    raise SystemExit(0)\n")
+    for jobs in ("1", "2"):
+        words = ["evaluate", f"{tmp_path}/mine.py:policy", "--env", "reach", "--episodes", "2", "-j", jobs]
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 2 and "the policy raised SystemExit" in done.output, done.output
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=200))

@@ -71,7 +71,7 @@ def numbers_of(action: Any, shape: tuple[int, ...], what: str) -> NDArray[np.flo
         found = np.array(action)
         if found.dtype.kind == "O":
             found = found.astype(float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{what}: {error}") from error
     if found.dtype.kind not in "biuf":
         raise ValueError(f"{what}, not of the type {found.dtype}")

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ligature.environments.experts import EXPERTS
 from ligature.environments.hand import Hand
-from ligature.environments.layout import ACTION
+from ligature.environments.layout import ACTION, numbers_of
 from ligature.environments.suturing import SuturingEnv
 from ligature.paths import real_path
 
@@ -24,6 +25,17 @@ Act = Callable[[Any], NDArray[Any]]
 
 Policy = Callable[[SuturingEnv, int], Act]
 """What acts in an episode, from the environment, which has been reset, and the seed of the episode."""
+
+
+RIGHT = "policy(env, seed) returns a function from observation to action"
+
+LOOK = "it may only look at it, and try things in a copy (copy.deepcopy)"
+"""What a policy may do with the environment."""
+
+LARGEST = float(np.finfo(np.float32).max)
+
+ROUNDING = 1e-9
+"""Metres by which bodies may seem to move where an environment is copied, which restores its state."""
 
 
 class PolicyError(ValueError):
@@ -124,10 +136,11 @@ def _function(place: str, name: str) -> Policy:
         found = getattr(_module(place), name)
     except (ImportError, AttributeError, OSError) as error:
         raise PolicyError(f"no policy '{place}:{name}': {error}") from error
-    except Exception as error:  # whatever the code of a user raises as it is imported
+    except (Exception, SystemExit) as error:  # whatever the code of a user raises as it is imported
         raise PolicyError(f"no policy '{place}:{name}': {_raised(error)}") from error
     if not callable(found):
-        raise PolicyError(f"'{place}:{name}' is not a function")
+        raise PolicyError(f"'{place}:{name}' is not a function; {RIGHT}")
+    _check_arguments(found, 2, f"'{place}:{name}' is called with environment and seed: {RIGHT}")
     return found  # type: ignore[no-any-return]
 
 
@@ -146,23 +159,74 @@ def _module(place: str) -> Any:
 
 
 def asked(policy: Policy, env: SuturingEnv, seed: int) -> Act:
-    """What acts in an episode that has begun; PolicyError, also from it later, names where a user's code raised."""
-    act = _guarded(policy, env, seed)
+    """What acts in an episode that has begun.
+
+    PolicyError, also from it later, names where a user's code raised, and what it did to the environment.
+    """
+    act = _guarded(env, policy, env, seed)
     if not callable(act):
-        raise PolicyError(f"a policy returns a function from observation to action, not {act!r}")
-    return lambda observation: _guarded(act, observation)  # type: ignore[no-any-return]
+        raise PolicyError(f"{RIGHT}; it returned {act!r}")
+    _check_arguments(act, 1, f"{RIGHT}, which takes the observation")
+    return lambda observation: _guarded(env, act, observation)  # type: ignore[no-any-return]
 
 
-def _guarded(function: Callable[..., Any], *arguments: Any) -> Any:
+def _check_arguments(function: Callable[..., Any], count: int, right: str) -> None:
+    """Raise PolicyError where a ``function`` of a user cannot be called with ``count`` arguments."""
     try:
-        return function(*arguments)
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # of some functions in C nobody knows
+        return
+    try:
+        signature.bind(*range(count))
+    except TypeError as error:
+        raise PolicyError(f"{right}; this one takes {signature}: {error}") from error
+
+
+def _guarded(env: SuturingEnv, function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a ``function`` of a user returns, which must leave ``env`` as it is."""
+    before = Moment.of(env)
+    try:
+        answer = function(*arguments)
     except PolicyError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise PolicyError(f"the policy raised {_raised(error)}") from error
+    done = before.changed(env)
+    if done:
+        raise PolicyError(f"the policy {done}; {LOOK}")
+    return answer
 
 
-def _raised(error: Exception) -> str:
+class Moment(NamedTuple):
+    """What nothing but an action changes in an environment while a policy is evaluated."""
+
+    episodes: int
+    steps: int
+    time: float
+    poses: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, env: SuturingEnv) -> Moment:
+        """That of now."""
+        simulation = env.simulation
+        return cls(env.episodes, env.steps, simulation.time, simulation.state["body_pose"].copy())
+
+    def changed(self, env: SuturingEnv) -> str:
+        """What was done to the environment since; empty: nothing."""
+        now = Moment.of(env)
+        if env.closed:
+            return "closed the environment"
+        if now.episodes != self.episodes:
+            return "reset the environment"
+        if now.steps != self.steps:
+            return "stepped the environment" if now.steps > self.steps else "restored another moment of the environment"
+        if now.time != self.time:
+            return "stepped the simulation"
+        moved = now.poses.shape != self.poses.shape or not np.allclose(now.poses, self.poses, rtol=0.0, atol=ROUNDING)
+        return "moved bodies of the simulation" if moved else ""
+
+
+def _raised(error: BaseException) -> str:
     """What was raised, and where."""
     if isinstance(error, SyntaxError):
         return f"SyntaxError: {error}"
@@ -172,8 +236,11 @@ def _raised(error: Exception) -> str:
 
 def checked(action: Any, width: int = ACTION) -> NDArray[np.float32]:
     """An action (``width``,) as the environment takes it; PolicyError where it is none."""
-    found = np.asarray(action)
-    if found.shape != (width,) or not np.issubdtype(found.dtype, np.number) or not np.isfinite(found).all():
-        what = f"shape {found.shape}" if found.shape != (width,) else "a value that is not finite"
-        raise PolicyError(f"an action is {width} finite numbers; the policy returned {what}")
-    return found.astype(np.float32)
+    right = f"the policy must return an action; an action is {width} finite numbers"
+    try:
+        found = numbers_of(action, (width,), right)
+    except ValueError as error:
+        raise PolicyError(str(error)) from error
+    if not np.isfinite(found).all():
+        raise PolicyError(f"{right}, not {found.tolist()}")
+    return np.clip(found, -LARGEST, LARGEST).astype(np.float32)

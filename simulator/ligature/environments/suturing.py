@@ -256,6 +256,21 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         return self._readings
 
     @property
+    def episodes(self) -> int:
+        """Episodes that have begun."""
+        return self._episodes
+
+    @property
+    def steps(self) -> int:
+        """Actions of this episode."""
+        return self._count
+
+    @property
+    def closed(self) -> bool:
+        """Whether it, or its simulation, is closed."""
+        return self._closed or self._simulation.closed
+
+    @property
     def randomisation(self) -> dict[str, Any]:
         """What was drawn for this episode, by the names of `Randomisation`; empty without ``randomise``."""
         return {} if self._drawn is None else self._drawn.as_dict()

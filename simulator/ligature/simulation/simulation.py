@@ -347,6 +347,11 @@ class Simulation:
     def __exit__(self, *error: object) -> None:
         self.close()
 
+    @property
+    def closed(self) -> bool:
+        """Whether `close` has been called."""
+        return self._closed
+
     def _check_open(self) -> None:
         """Raise RuntimeError after `close`: compiled code holds addresses of the engine that is gone."""
         if self._closed:
