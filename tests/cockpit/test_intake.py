@@ -208,7 +208,7 @@ def test_a_gizmo_goes_where_it_can_be_dragged_only() -> None:
         assert placeable(rng.uniform(-2, 2, 3).tolist(), (q / np.linalg.norm(q)).tolist())
     for position in ((0, 0), (0, 0, math.nan), (0, 0, 1e9), "abc", None, ("a", "b", "c"), 3):
         assert not placeable(position, (1, 0, 0, 0))
-    for quaternion in ((0, 0, 0, 0), (1, 0, 0), (math.inf, 0, 0, 0), None, {"w": 1}):
+    for quaternion in ((0, 0, 0, 0), (1, 0, 0), (math.inf, 0, 0, 0), None, {"w": 1}, (10**400, 0, 0, 0)):
         assert not placeable((0, 0, 0), quaternion)
 
 

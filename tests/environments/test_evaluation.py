@@ -226,6 +226,15 @@ def test_the_command_writes_what_it_prints(network: Path, tmp_path: Path) -> Non
     assert len(page.pictures) == 6 and all((out / name).stat().st_size > 1000 for name in page.pictures)
 
 
+@pytest.mark.parametrize("name", ["evaluation.json", "index.html"])
+def test_an_evaluation_is_not_written_over(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ligature.cli.evaluate.run_episodes", lambda *_: pytest.fail("it simulates"))
+    (tmp_path / name).write_text("of yesterday")
+    done = CliRunner().invoke(app, ["evaluate", "random", "--env", "reach", "--out", str(tmp_path)])
+    assert done.exit_code == 2 and f"'{tmp_path / name}' exists already; choose another folder" in done.output
+    assert (tmp_path / name).read_text() == "of yesterday"
+
+
 def test_without_opengl_or_a_disk_for_the_output_the_figures_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

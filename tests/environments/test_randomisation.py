@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle  # noqa: TID251 (what processes exchange)
+import re
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ from ligature.environments.randomisation import BOUNDS, PHYSICS, Drawn, things_o
 from ligature.environments.variation import Channel, varied
 from ligature.model.load import load
 from ligature.model.scene import Scene
+
+from tests.conftest import ROOT
 
 DELAYS = ("action_delay", "observation_delay")
 
@@ -92,6 +95,8 @@ def test_ranges_come_back_from_a_file(tmp_path_factory: pytest.TempPathFactory, 
             "'1e-3' is not; YAML reads it as text: write a decimal point, as in 1.0e-3",
         ),
         ({"action_delay": [0.5, 2]}, "action_delay must be a pair .* of whole numbers from 0 to 25 .* 0.5 is not"),
+        ({"mass": [1, 10**400]}, r"mass must be a pair .*, but 10+\.\.\.0+ is not"),
+        ({"mass": None}, r"mass must be a pair \[low, high\] of numbers from 0.2 to 5 \(times\), not None"),
         ([1, 2], "randomise must be ranges by name or a YAML file of them, not list"),
     ],
 )
@@ -102,7 +107,13 @@ def test_invalid_ranges_are_refused(config: Any, message: str) -> None:
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("[1, 2", "cannot be read"), ("- 1", "must hold ranges by name"), (None, "cannot be read: .*No such file")],
+    [
+        ("mass: [1, 2]\nlight: [1, 1]\n\n'mass': [0.5, 2]", "line 4: 'mass' is already in line 1; keep one of them"),
+        ("mass:", r"mass must be a pair \[low, high\] .*, not None"),
+        ("[1, 2", "cannot be read"),
+        ("- 1", "must hold ranges by name"),
+        (None, "cannot be read: .*No such file"),
+    ],
 )
 def test_invalid_files_are_refused(tmp_path: Path, text: str | None, message: str) -> None:
     path = tmp_path / "randomise.yaml"
@@ -213,6 +224,50 @@ def test_another_world_in_each_episode_can_be_kept_too() -> None:
     assert env.randomisation == drawn
     np.testing.assert_allclose([env.step(action)[0] for action in ACTIONS], first, atol=1e-12)
     env.close()
+
+
+@settings(max_examples=30)
+@given(names=st.lists(st.sampled_from(sorted(BOUNDS)), min_size=1, max_size=6))
+def test_a_file_that_states_a_range_twice_is_refused(
+    tmp_path_factory: pytest.TempPathFactory, names: list[str]
+) -> None:
+    path = tmp_path_factory.mktemp("twice") / "randomise.yaml"
+    path.write_text("".join(f"{name}: [{BOUNDS[name].most:g}, {BOUNDS[name].most:g}]\n" for name in names))
+    if len(set(names)) == len(names):
+        assert Randomisation.of(path) is not None
+    else:
+        with pytest.raises(ValueError, match=f"{path} .*line .* is already in line .*; keep one of them"):
+            Randomisation.of(path)
+
+
+def test_the_size_of_a_needle_is_drawn_where_there_is_one() -> None:
+    for task in ("peg_transfer", "pick"):
+        env = SuturingEnv(task, randomise={"needle_size": [0.9, 1.1]})
+        drawn = env.reset(seed=1)[1]["randomisation"]
+        env.close()
+        assert ("needle_size" in drawn) == (task == "pick")
+
+
+def test_the_documents_list_the_limits_of_all_ranges() -> None:
+    text = (ROOT / "docs" / "learning.md").read_text()
+    rows = dict(re.findall(r"^\| `(\w+)` \| ([^|]+ to [^|]+ \| [^|]+) \|$", text, re.M))
+    assert rows == {
+        name: f"{'whole numbers from ' * bound.whole}{bound.least:g} to {bound.most:g} | {bound.unit}"
+        for name, bound in BOUNDS.items()
+    }
+
+
+def test_a_state_of_other_ranges_is_refused_with_those_that_differ() -> None:
+    envs = [
+        SuturingEnv("reach", randomise={"light": [1, 1], "exposure": [0, 1], **more})
+        for more in ({}, {"light": [1, 2]})
+    ]
+    envs[0].reset(seed=1)
+    with pytest.raises(ValueError) as error:
+        envs[1].restore(envs[0].save())
+    assert str(error.value) == "the state has randomise with light=[1.0, 1.0], not light=[1.0, 2.0]"
+    for env in envs:
+        env.close()
 
 
 def test_without_ranges_nothing_is_drawn() -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import copy
 import pickle  # noqa: TID251 (what processes exchange)
+import re
 from collections.abc import Iterator
+from functools import partial
 
 import gymnasium
 import numpy as np
@@ -18,6 +20,8 @@ from ligature.environments.actions import AHEAD_ANGLE, AHEAD_JOINTS, AHEAD_LENGT
 from ligature.environments.goals import GOALS
 from ligature.model.frames import frame, inverse, pose7_matrix
 from ligature.robots.poses import rotation_vector
+
+from tests.conftest import ROOT
 
 IDS = sorted(name for name in gymnasium.registry if name.startswith("ligature/"))
 
@@ -473,6 +477,31 @@ def test_episodes_of_made_environments_are_cut_where_the_specification_has_it() 
         gymnasium.make("ligature/Reach-v0", max_steps=3)
 
 
+VIEWS = (
+    "arm", "arms", "base_position", "base_rotation", "goal", "needle", "needle_force", "readings", "setpoint",
+    "simulation", "tool_position", "tool_positions",
+)  # fmt: skip
+"""What an environment shows of its simulation."""
+
+
+@pytest.mark.parametrize("task", sorted(GOALS))
+def test_info_has_the_keys_that_the_documents_list(task: str) -> None:
+    """The same at a reset and a step; of soft tissue where there is some."""
+    text = (ROOT / "docs" / "learning.md").read_text()
+    table = text[text.index("| key of `info` |") :].partition("\n\n")[0]
+    listed = [
+        (name, "soft tissue" in row) for row in table.splitlines() for name in re.findall(r"`(\w+)`", row.split("|")[1])
+    ]
+    env = SuturingEnv(task, randomise={})
+    _, begun = env.reset(seed=1)
+    *_, then = env.step(np.zeros(env.action_space.shape))
+    soft = bool(env.simulation.scene.tissues)
+    env.close()
+    expected = {name for name, of_tissue in listed if soft or not of_tissue} - {"info"}
+    assert set(begun) == expected and set(then) == expected - {"randomisation"}
+    assert (begun["refused"], begun["bounded"]) == ("", False)
+
+
 def test_a_closed_environment_reports_that_whatever_is_asked_of_it() -> None:
     env = SuturingEnv("reach", render_mode="rgb_array")
     env.reset(seed=1)
@@ -482,14 +511,15 @@ def test_a_closed_environment_reports_that_whatever_is_asked_of_it() -> None:
     still = np.zeros(7)
     for ask in (
         lambda: env.step(still), env.reset, env.save, env.render, lambda: env.restore(state),
-        lambda: copy.deepcopy(env), lambda: pickle.dumps(env),
+        lambda: copy.deepcopy(env), lambda: pickle.dumps(env), env.true_state,
+        *(partial(getattr, env, name) for name in VIEWS),
     ):  # fmt: skip
         with pytest.raises(RuntimeError, match="the environment is closed: make another one"):
             ask()
 
 
 NO_ACTIONS = [
-    np.zeros(6), np.zeros(8), np.zeros((1, 7)), 0.0, None, ["a"] * 7, {}, [[0.0]] * 7,
+    np.zeros(6), np.zeros(8), np.zeros((1, 7)), 0.0, None, ["a"] * 7, {}, [[0.0]] * 7, [10**400] * 7,
     *(np.zeros(7, kind) for kind in ("c16", "M8[s]", "m8[s]", "S1", "U1", "V4", [("x", "f4")])),
 ]  # fmt: skip
 
@@ -535,6 +565,7 @@ def test_an_action_is_its_numbers_whatever_their_type() -> None:
         ({"max_steps": 0}, ValueError, "max_steps is a number of actions, at least 1"),
         ({"max_steps": 1.5}, ValueError, "max_steps is a number of actions, at least 1"),
         ({"render_mode": "human"}, ValueError, "render_mode must be None or rgb_array"),
+        ({"camera": "nope"}, KeyError, "'nope' does not name exactly one camera; choose one of"),
         ({"observation": "image", "camera": "far"}, KeyError, "'far' does not name exactly one camera; choose one of"),
     ],
 )

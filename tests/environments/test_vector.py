@@ -217,7 +217,7 @@ def test_a_server_that_forks_starts_them_too() -> None:
     ("wrong", "message"),
     [
         ({"n": 0}, "n is a number of environments, at least 1, not 0"),
-        ({"n": "2"}, "n is a number of environments, at least 1, not 2"),
+        ({"n": "2"}, "n is a number of environments, at least 1, not '2'"),
         ({"n": 2.0}, "n is a number of environments, at least 1, not 2.0"),
         ({"n": 1, "autoreset": "never"}, "autoreset must be one of 'next step', 'same step', 'off', not 'never'"),
         ({"n": 1, "action": "torque"}, "action must be one of cartesian, joint"),

@@ -22,6 +22,9 @@ from ligature.paths import check_folder
 from ligature.render import RenderUnavailable
 from ligature.render.files import write_json, write_png
 
+REPORT, PAGE = "evaluation.json", "index.html"
+"""Files of an evaluation."""
+
 EVERY = 10.0
 """Seconds between two lines of progress."""
 
@@ -41,20 +44,28 @@ def evaluate(
         steps = max_steps or GOALS.get(options["task"], Goal).steps
         load_policy(policy)  # what is wrong with it is reported before anything is simulated, as what is with `out`
         if out is not None:
-            check_folder(out)
+            _check_new(out)
         with ending_in_order():
             episodes = _run(policy, options, seeds, steps, jobs, console)
         found = report(policy, options, episodes, __version__)
-        files = [] if out is None else [write_json(found, out / "evaluation.json")]  # first of all: hours may be in it
+        files = [] if out is None else [write_json(found, out / REPORT)]  # first of all: hours may be in it
         _print(found["summary"], console)
         if out is not None:
             shown = _drawn(policy, options, episodes[:pictures], steps, out, console)
-            files.append(write_page(found, shown, out / "index.html"))
+            files.append(write_page(found, shown, out / PAGE))
             console.print("\n".join(map(str, files)), markup=False)
     except (PolicyError, ValueError, RenderUnavailable, WorkerEndedError) as error:
         console.print(str(error), style="red", markup=False)
         return 2
     return 0
+
+
+def _check_new(out: Path) -> None:
+    """Raise OSError for a folder that cannot be written, and ValueError for one that has an evaluation."""
+    check_folder(out)
+    for name in (REPORT, PAGE):
+        if (out / name).exists():
+            raise ValueError(f"'{out / name}' exists already; choose another folder")
 
 
 def _drawn(

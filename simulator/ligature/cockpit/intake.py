@@ -70,7 +70,7 @@ def placeable(position: Any, wxyz: Any) -> bool:
     """Whether something can be dragged to ``position`` (3,) and the quaternion ``wxyz`` (4,)."""
     try:
         p, q = np.array(position, dtype=float), np.array(wxyz, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return False
     return p.shape == (3,) and q.shape == (4,) and bool(np.abs(p).max() <= FARTHEST and 0.5 < np.linalg.norm(q) < 2.0)
 
@@ -88,7 +88,7 @@ def _looks(message: ViewerCameraMessage) -> bool:
     vectors = (message.wxyz, message.position, message.look_at, message.up_direction)
     try:
         numbers = [np.array(value, dtype=float) for value in (*vectors, [message.fov, message.near, message.far])]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return False
     shaped = [value.shape for value in numbers] == [(4,), (3,), (3,), (3,), (3,)]
     return shaped and all(np.isfinite(value).all() for value in numbers) and bool(numbers[0].any())

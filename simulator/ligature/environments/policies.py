@@ -213,9 +213,9 @@ class Moment(NamedTuple):
 
     def changed(self, env: SuturingEnv) -> str:
         """What was done to the environment since; empty: nothing."""
-        now = Moment.of(env)
         if env.closed:
             return "closed the environment"
+        now = Moment.of(env)
         if now.episodes != self.episodes:
             return "reset the environment"
         if now.steps != self.steps:

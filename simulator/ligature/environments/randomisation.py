@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import reprlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -133,7 +134,7 @@ class Randomisation:
         unknown = [str(name) for name in given if name not in BOUNDS]
         if unknown:
             raise ValueError(f"randomise: unknown key '{unknown[0]}'; choose one of {', '.join(BOUNDS)}")
-        return cls(**given)
+        return cls(**{name: _checked(name, value, BOUNDS[name]) for name, value in given.items()})
 
     def as_dict(self) -> dict[str, list[float]]:
         """The ranges that are given, as a YAML file has them."""
@@ -179,6 +180,8 @@ class Randomisation:
             "mass": each(free, one), "friction": each([name for name, _ in things], one),
             "action_delay": whole, "observation_delay": whole,
         }  # fmt: skip
+        if not scene.needles:
+            del how["needle_size"]
         noise_seed = int(rng.integers(2**31))
         return Drawn(noise_seed, **{name: draw(name) for name, draw in how.items() if getattr(self, name) is not None})
 
@@ -187,8 +190,8 @@ class Randomisation:
 class Drawn:
     """What one episode has, by the names of `Randomisation`; None where nothing was to be drawn.
 
-    Of lights, bodies and things there is a value for each, by identifier; an arm and a thread are known by their
-    first body. ``noise_seed`` is that of all noise.
+    A scene without a needle has no size of it. Of lights, bodies and things there is a value for each, by identifier;
+    an arm and a thread are known by their first body. ``noise_seed`` is that of all noise.
     """
 
     noise_seed: int = 0
@@ -243,16 +246,23 @@ def _checked(name: str, value: Any, bound: Bound) -> Range:
     if isinstance(value, str) or not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
         raise ValueError(f"{wanted}, not {value!r}")
     for number in value:
-        real = isinstance(number, int | float | np.number) and not isinstance(number, bool)
-        if not real or not math.isfinite(number) or (bound.whole and number != int(number)):
+        if not _is_number(number) or (bound.whole and number != int(number)):
             hint = "; YAML reads it as text: write a decimal point, as in 1.0e-3" if isinstance(number, str) else ""
-            raise ValueError(f"{wanted}, but {number!r} is not{hint}")
+            raise ValueError(f"{wanted}, but {reprlib.repr(number)} is not{hint}")
     low, high = float(value[0]), float(value[1])
     if low > high:
         raise ValueError(f"{wanted}, but {low:g} is above {high:g}: write the lower one first")
     if low < bound.least or high > bound.most:
         raise ValueError(f"{wanted}, not {low:g} to {high:g}")
     return low, high
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is a finite number."""
+    try:
+        return isinstance(value, int | float | np.number) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floating-point ones
+        return False
 
 
 def _read(path: Path) -> Any:
@@ -263,6 +273,7 @@ def _read(path: Path) -> Any:
                 raise ValueError(f"it has more than {MOST_BYTES >> 10} KiB")
             text = file.read().decode("utf-8")
         _check_flat(text)
+        _check_once(text)
         found = yaml.safe_load(text)
     except (OSError, ValueError, yaml.YAMLError) as error:
         why = reason(error) if isinstance(error, OSError) else " ".join(str(error).split())
@@ -281,3 +292,13 @@ def _check_flat(text: str) -> None:
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > MOST_LEVELS:
             raise ValueError(f"line {event.start_mark.line + 1}: a range is a pair of numbers, without lists in it")
+
+
+def _check_once(text: str) -> None:
+    """Raise ValueError for a name that stands twice, of which YAML takes the last."""
+    lines: dict[str, int] = {}
+    node = yaml.compose(text, Loader=yaml.SafeLoader)
+    for key, _ in node.value if isinstance(node, yaml.MappingNode) else ():
+        line = key.start_mark.line + 1
+        if isinstance(key, yaml.ScalarNode) and lines.setdefault(key.value, line) != line:
+            raise ValueError(f"line {line}: '{key.value}' is already in line {lines[key.value]}; keep one of them")

@@ -40,6 +40,9 @@ CONTROL = 0.02
 
 SUCCESS_REWARD = 1.0
 
+CAMERA = "cameraL"
+"""What shows an environment by default; a scene without it can be simulated, but not drawn."""
+
 MOST_PIXELS = 16384
 """Of a side of a picture."""
 
@@ -151,7 +154,7 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         action: str = "cartesian",
         observation: str = "state",
         reward: str = "dense",
-        camera: str = "cameraL",
+        camera: str = CAMERA,
         size: tuple[int, int] = (84, 84),
         max_steps: int | None = 200,
         render_mode: str | None = None,
@@ -204,7 +207,7 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
             self._ticks = round(CONTROL / self._simulation.dt)
             self._goal: Goal = GOALS[self.task](self._simulation, self._arms)
             self._settle()
-            if self._observation != "state" or self.render_mode is not None:
+            if self._observation != "state" or self.render_mode is not None or self._camera != CAMERA:
                 self._simulation.cameras[self._camera]  # KeyError names those that there are
         except Exception:
             self._simulation.close()
@@ -230,6 +233,7 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
     @property
     def goal(self) -> Goal:
         """What is to be done."""
+        self._check_open()
         return self._goal
 
     @property
@@ -238,21 +242,25 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
 
         With ranges of masses, friction or the needle's size it is another one after each `reset`.
         """
+        self._check_open()
         return self._simulation
 
     @property
     def arm(self) -> PsmArm:
         """The arm that acts, the first of several."""
+        self._check_open()
         return self._arms[0]
 
     @property
     def arms(self) -> tuple[PsmArm, ...]:
         """The arms that act."""
+        self._check_open()
         return self._arms
 
     @property
     def readings(self) -> tuple[ArmReading, ...]:
         """What the arms report."""
+        self._check_open()
         return self._readings
 
     @property
@@ -278,6 +286,7 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
     @property
     def needle(self) -> int:
         """The body that is handled, such as the needle."""
+        self._check_open()
         return self._goal.body
 
     @property
@@ -293,16 +302,19 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
     @property
     def tool_position(self) -> Array:
         """The control point (3,) of the first arm's tool, world axes."""
+        self._check_open()
         return self._readings[0].tip_position()
 
     @property
     def tool_positions(self) -> Array:
         """The control points (arms, 3) of all tools, world axes."""
+        self._check_open()
         return np.array([reading.tip_position() for reading in self._readings])
 
     @property
     def needle_force(self) -> Array:
         """What tissue, or holes in it, exert on the needle (3,), N, world axes."""
+        self._check_open()
         state = self._simulation.state[0]
         n = int(state["insertion_count"])
         return np.asarray(state["insertion_force"][:n][state["insertion_body"][:n] == self.needle].sum(axis=0))
@@ -310,16 +322,19 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
     @property
     def base_rotation(self) -> Array:
         """Rotation (3, 3) of the arm's base in the world; actions are along the base's axes, targets in the world's."""
+        self._check_open()
         return pose7_matrix(self._readings[0].base)[:3, :3]
 
     @property
     def base_position(self) -> Array:
         """Where the arm's base is (3,), world axes."""
+        self._check_open()
         return np.array(self._readings[0].base[:3])
 
     @property
     def setpoint(self) -> Array:
         """Pose (7,) of the tip in the arm's base that is asked for; Cartesian actions are added to it."""
+        self._check_open()
         return np.array(self._readings[0].setpoint)
 
     def true_state(self) -> Array:
@@ -453,8 +468,9 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         if not isinstance(state, EnvState):
             raise TypeError(f"a {type(state).__name__} is not a state of an environment; restore what 'save' returned")
         for name in ("task", "scene", "arm", "randomise"):
-            if state.options[name] != self._options[name]:
-                raise ValueError(f"the state has {name}={state.options[name]!r}, not {self._options[name]!r}")
+            theirs, own = state.options[name], self._options[name]
+            if theirs != own:
+                raise ValueError(f"the state has {_difference(name, theirs, own)}")
         if state.drawn is not None:
             self._take(state.drawn)
         self._simulation.restore(state.snapshot)
@@ -593,6 +609,17 @@ def _scene(task: str, arms: tuple[str, ...]) -> Scene:
     fixed = {needle.body for needle in scene.needles}
     bodies = tuple(replace(body, mass=0.0) if body.index in fixed else body for body in scene.bodies)
     return replace(scene, bodies=bodies, rods=())
+
+
+def _difference(name: str, theirs: Any, own: Any) -> str:
+    """How the option ``name`` of a state differs from the own one; of ranges, those that do."""
+    if not (isinstance(theirs, Randomisation) and isinstance(own, Randomisation)):
+        first, second = (given.as_dict() if isinstance(given, Randomisation) else given for given in (theirs, own))
+        return f"{name}={first!r}, not {second!r}"
+    ranges, others = theirs.as_dict(), own.as_dict()
+    differing = [each for each in {**ranges, **others} if ranges.get(each) != others.get(each)]
+    first, second = (", ".join(f"{each}={given.get(each)}" for each in differing) for given in (ranges, others))
+    return f"{name} with {first}, not {second}"
 
 
 def _made(options: Mapping[str, Any], state: EnvState | None) -> SuturingEnv:

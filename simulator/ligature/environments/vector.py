@@ -64,7 +64,7 @@ class SuturingVectorEnv(AsyncVectorEnv):
 
     def __init__(self, task: str, n: int, autoreset: str = "next step", **options: Any) -> None:
         if not isinstance(n, int | np.integer) or n < 1:
-            raise ValueError(f"n is a number of environments, at least 1, not {n}")
+            raise ValueError(f"n is a number of environments, at least 1, not {n!r}")
         if autoreset not in AUTORESET:
             raise ValueError(f"autoreset must be one of {', '.join(map(repr, AUTORESET))}, not {autoreset!r}")
         made = _Made(task, options, os.getpid())

@@ -161,7 +161,7 @@ def _array(what: str, values: ArrayLike, wanted: str) -> Array:
         if np.iscomplexobj(array):
             raise TypeError("complex numbers")
         return array.astype(float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise TypeError(f"{what} takes numbers ({wanted}), not {reprlib.repr(values)}") from error
 
 
