@@ -11,13 +11,16 @@ import argparse
 import sys
 from pathlib import Path
 
-import matplotlib as mpl
-import numpy as np
+try:
+    import matplotlib as mpl
+    import numpy as np
 
-mpl.use("Agg")
-from matplotlib import pyplot as plt
-from matplotlib.axes import Axes
-from matplotlib.ticker import PercentFormatter
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+    from matplotlib.axes import Axes
+    from matplotlib.ticker import PercentFormatter
+except ModuleNotFoundError as missing:
+    sys.exit(f"{missing}; run: pip install matplotlib")
 
 LINE, FAINT = "#2563a8", "#9bbbdc"
 

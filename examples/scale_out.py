@@ -21,12 +21,15 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-import ray
-from ligature.environments import MAX_STEPS, SuturingEnv
-from ligature.environments.experts import CORRECTING, demonstrate
-from ligature.environments.layout import ACTION, STATE
-from ligature.environments.policies import Policy, load_policy
+try:
+    import numpy as np
+    import ray
+    from ligature.environments import MAX_STEPS, SuturingEnv
+    from ligature.environments.experts import CORRECTING, demonstrate
+    from ligature.environments.layout import ACTION, STATE
+    from ligature.environments.policies import Policy, load_policy
+except ModuleNotFoundError as missing:
+    sys.exit(f"{missing}; run: pip install 'ligature-sim[learn,train]' ray==2.44.1")
 
 SEEDS = 10_000
 """Seeds that a seed of the training has; those of evaluations begin at 1 000 000."""

@@ -13,12 +13,15 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
-import pyarrow.parquet as pq
-import torch
-from ligature.environments.layout import ACTION, HELD
-from networks import Scale, ToolView, base_pose, save
-from torch import Tensor, nn
+try:
+    import numpy as np
+    import pyarrow.parquet as pq
+    import torch
+    from ligature.environments.layout import ACTION, HELD
+    from networks import Scale, ToolView, base_pose, save
+    from torch import Tensor, nn
+except ModuleNotFoundError as missing:
+    sys.exit(f"{missing}; run: pip install 'ligature-sim[learn,lerobot,train]'")
 
 OBSERVATION, SHOWN = "observation.environment_state", "extra.expert_action"
 HIDDEN = 256

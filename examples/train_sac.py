@@ -15,20 +15,23 @@ import time
 from functools import partial
 from pathlib import Path
 
-import gymnasium
-import networks
-import numpy as np
-import torch
-from ligature.environments import MAX_STEPS, SuturingEnv, registered
-from ligature.environments.goals import GOALS
-from ligature.environments.layout import STATE
-from networks import ToolView
-from stable_baselines3 import SAC
-from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.running_mean_std import RunningMeanStd
-from stable_baselines3.common.vec_env import SubprocVecEnv, VecNormalize
-from torch import nn
+try:
+    import gymnasium
+    import networks
+    import numpy as np
+    import torch
+    from ligature.environments import MAX_STEPS, SuturingEnv, registered
+    from ligature.environments.goals import GOALS
+    from ligature.environments.layout import STATE
+    from networks import ToolView
+    from stable_baselines3 import SAC
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.running_mean_std import RunningMeanStd
+    from stable_baselines3.common.vec_env import SubprocVecEnv, VecNormalize
+    from torch import nn
+except ModuleNotFoundError as missing:
+    sys.exit(f"{missing}; run: pip install 'ligature-sim[learn,train]'")
 
 WINDOW = 50
 """Episodes over which the printed success is counted."""
