@@ -1,12 +1,14 @@
 """Records demonstrations of a learning environment's scripted expert as a dataset.
 
 ``python examples/record_experts.py OUT.h5 --task reach --episodes 50``; ``ligature dataset export OUT.h5 FOLDER`` makes
-a dataset of LeRobot of it. Ctrl-C and SIGTERM keep the episodes that have ended.
+a dataset of LeRobot of it. With ``--randomise FILE`` each episode draws another world, and has it as the attribute
+``randomisation``. Ctrl-C and SIGTERM keep the episodes that have ended.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from pathlib import Path
@@ -14,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from ligature.datasets import DatasetError, DatasetWriter
 from ligature.datasets.interrupts import interrupted_once
-from ligature.environments import SuturingEnv, env_id
+from ligature.environments import Randomisation, SuturingEnv, env_id
 from ligature.environments.experts import EXPERTS, demonstrate
 from ligature.environments.goals import GOALS, FirstThrow, KnotTie, Suture
 from ligature.environments.suturing import CONTROL
@@ -74,20 +76,34 @@ def _throwing(env: SuturingEnv, goal: FirstThrow, arms: list[str]) -> tuple[str,
     return "wrap", arms[:1]
 
 
-def record(env: SuturingEnv, writer: DatasetWriter, seed: int, noise: float) -> bool:
+def record(env: SuturingEnv, writer: DatasetWriter, seed: int, noise: float, pictures: bool = False) -> bool:
     """One episode, with what the environment observes and what the expert does then; whether it succeeded."""
 
     def look(observation: np.ndarray, action: np.ndarray) -> None:
+        writer.follow(env.simulation)  # with some ranges each reset makes another one
+        if pictures:
+            env.dress()
         name, arms = phase(env)
         writer.sample(name, arms, extra={"environment_state": observation, "expert_action": action})
 
     try:
         _, info = demonstrate(env, seed, noise, look)
     except ValueError as error:
-        writer.end_episode(False, judged=True, seed=seed, why=str(error))
+        writer.end_episode(False, judged=True, seed=seed, why=str(error), **drawn(env))
         return False
-    writer.end_episode(info["is_success"], judged=True, seed=seed, why=info["lost"])
+    writer.end_episode(info["is_success"], judged=True, seed=seed, why=info["lost"], **drawn(env))
     return bool(info["is_success"])
+
+
+def drawn(env: SuturingEnv) -> dict[str, str]:
+    """What was drawn for an episode, as a remark of a dataset."""
+    return {"randomisation": json.dumps(env.randomisation)} if env.randomisation else {}
+
+
+def unseen(ranges: Randomisation | None) -> str:
+    """A range of the sensor, which pictures of a dataset do not show; empty without."""
+    names = ("exposure", "picture_noise")
+    return next((name for name in names if ranges is not None and getattr(ranges, name) is not None), "")
 
 
 def main() -> int:
@@ -101,10 +117,18 @@ def main() -> int:
         "--noise", type=float, default=0.2, help="the most that disturbs the expert, as a share of an action"
     )
     arguments.add_argument("--camera", action="append", default=[], help="repeatable; none by default")
+    arguments.add_argument("--randomise", type=Path, help="YAML file of ranges from which every episode draws")
     given = arguments.parse_args()
     if given.episodes < 1 or given.seed < 0 or not 0.0 <= given.noise <= 1.0:
         arguments.error("--episodes is at least 1, --seed at least 0, and --noise from 0 to 1")
-    env, steps = SuturingEnv(given.task, max_steps=max(MOST, GOALS[given.task].steps)), phases(given.task)
+    try:
+        ranges = Randomisation.of(given.randomise)
+    except ValueError as error:
+        arguments.error(str(error))
+    if given.camera and unseen(ranges):
+        arguments.error(f"pictures of a dataset do not show '{unseen(ranges)}'; leave it out of {given.randomise}")
+    most, steps = max(MOST, GOALS[given.task].steps), phases(given.task)
+    env = SuturingEnv(given.task, max_steps=most, randomise=ranges)
     begin, done, ended, stopped = time.perf_counter(), 0, 0, 0
     try:
         with interrupted_once():
@@ -115,7 +139,7 @@ def main() -> int:
                     remarks={"source": "scripted expert", "environment": env_id(given.task)},
                 ) as writer:  # fmt: skip
                     for seed in range(given.seed, given.seed + given.episodes):
-                        done += record(env, writer, seed, given.noise)
+                        done += record(env, writer, seed, given.noise, bool(given.camera))
                         ended += 1
             except KeyboardInterrupt as interrupt:
                 (stopped,) = interrupt.args  # the signal

@@ -35,7 +35,8 @@ WRONG: dict[str, Any] = {
     "text": "home", "nothing": None, "short": POSE[:3], "long": [*POSE, 0.0], "empty": [], "names": {"x": 1.0},
     "no numbers": [None] * 7, "nan": [float("nan")] * 7, "infinite": [float("inf"), *POSE[1:]], "no rotation": [0.0] * 7,
     "complex": np.array(POSE, complex), "generator": (n for n in POSE), "unequal": [[1.0], [1.0, 2.0]],
-    "scaled matrix": 2.0 * np.eye(4), "mirrored matrix": np.diag([1.0, 1.0, -1.0, 1.0]), "a function": print, "huge": [10**400] * 7,
+    "scaled matrix": 2.0 * np.eye(4), "mirrored matrix": np.diag([1.0, 1.0, -1.0, 1.0]), "a function": print,
+    "huge": [10**400] * 7,
 }  # fmt: skip
 WHOLE = (3, 3.0, np.int64(3), np.uint8(3), np.float32(3.0), np.array(3), np.array([3]), Decimal(3))
 BROKEN = (1.5, "3", None, [1, 2], float("nan"), float("inf"), 1j, object())

@@ -241,11 +241,12 @@ def test_a_file_that_states_a_range_twice_is_refused(
 
 
 def test_the_size_of_a_needle_is_drawn_where_there_is_one() -> None:
-    for task in ("peg_transfer", "pick"):
-        env = SuturingEnv(task, randomise={"needle_size": [0.9, 1.1]})
+    """Nor is anything drawn for masses where no body is free."""
+    for task, expected in (("peg_transfer", {"mass"}), ("pick", {"mass", "needle_size"}), ("reach", {"needle_size"})):
+        env = SuturingEnv(task, randomise={"needle_size": [0.9, 1.1], "mass": [1.0, 2.0]})
         drawn = env.reset(seed=1)[1]["randomisation"]
         env.close()
-        assert ("needle_size" in drawn) == (task == "pick")
+        assert set(drawn) == expected | {"noise_seed"}
 
 
 def test_the_documents_list_the_limits_of_all_ranges() -> None:

@@ -123,7 +123,8 @@ class DatasetWriter:
         check_gestures(gestures, self._phases[1:])
         self._gestures = dict(gestures or {})
         self._remarks = remarks_of({"task": task}) | remarks_of(remarks, of_all=True)
-        self._cameras = _named(simulation, unique_names("cameras", cameras))
+        self._shown = unique_names("cameras", cameras)
+        self._cameras = _named(simulation, self._shown)
         self._watch, self._events = ActivityWatch(simulation.scene), EventWatch(simulation)
         self._episode: h5py.File | None = None
         self._rows: EpisodeRows | None = None
@@ -159,6 +160,21 @@ class DatasetWriter:
         attributes["joint_units"] = [_unit(scene.joints[joint].type) for joint in arm.joints]
         if arm.base >= 0:
             attributes["base_pose"] = self._simulation.state["body_pose"][0, arm.base]
+
+    def follow(self, simulation: Simulation) -> None:
+        """Sample another ``simulation`` from the next episode on, such as one that a reset of an environment has made.
+
+        Raises ValueError within an episode, and for a simulation whose bodies, arms, threads, tissues or cameras are
+        others: all episodes of a dataset have the same arrays.
+        """
+        if simulation is self._simulation:
+            return
+        if self._episode is not None:
+            raise ValueError("an episode goes on in another simulation: end or drop it before follow()")
+        _check_alike(self._simulation.scene, simulation.scene)
+        self._cameras = _named(simulation, self._shown)
+        self._simulation = simulation
+        self._watch, self._events = ActivityWatch(simulation.scene), EventWatch(simulation)
 
     # --- episodes ---------------------------------------------------------------------------
 
@@ -216,7 +232,7 @@ class DatasetWriter:
         if self._ended:
             raise DatasetError(f"the dataset '{self._path}' is closed; make another writer for another file")
         if self._simulation.closed:
-            raise RuntimeError("the simulation is closed: no sample can be taken; make a new one, and a new writer")
+            raise RuntimeError("the simulation of this dataset is closed; call follow() with one that runs")
         time = self._simulation.time
         if self._episode is not None:
             self._check_time(time)
@@ -481,6 +497,27 @@ def _named(simulation: Simulation, cameras: Sequence[str]) -> dict[str, CameraHa
             raise ValueError(f"cameras: two are called '{short}'; a dataset can have one of them")
         found[short] = handle
     return found
+
+
+def _check_alike(before: Scene, now: Scene) -> None:
+    """Raise ValueError where two scenes do not have the same arrays in a dataset."""
+    for what, first, second in zip(("bodies", "arms", "threads", "tissues"), _kinds(before), _kinds(now), strict=True):
+        if first != second:
+            raise ValueError(f"the simulation has other {what} than the dataset; write another dataset")
+
+
+def _kinds(scene: Scene) -> tuple[Any, ...]:
+    """Bodies, arms, threads and tissues of a scene, as far as a dataset's arrays depend on them."""
+    return (
+        (
+            [body.identity.topic for body in scene.bodies],
+            [ghost.identity.topic for ghost in scene.ghosts],
+            [needle.body for needle in scene.needles],
+        ),
+        [(arm.name, arm.kind, [scene.joints[joint].type for joint in arm.joints]) for arm in scene.arms],
+        [rod.bodies for rod in scene.rods],
+        [(tissue.body, tissue.rows) for tissue in scene.tissues],
+    )
 
 
 def _unit(kind: JointType) -> str:

@@ -183,15 +183,16 @@ class Randomisation:
         if not scene.needles:
             del how["needle_size"]
         noise_seed = int(rng.integers(2**31))
-        return Drawn(noise_seed, **{name: draw(name) for name, draw in how.items() if getattr(self, name) is not None})
+        found = {name: draw(name) for name, draw in how.items() if getattr(self, name) is not None}
+        return Drawn(noise_seed, **{name: value for name, value in found.items() if value != {}})
 
 
 @dataclass(frozen=True)
 class Drawn:
     """What one episode has, by the names of `Randomisation`; None where nothing was to be drawn.
 
-    A scene without a needle has no size of it. Of lights, bodies and things there is a value for each, by identifier;
-    an arm and a thread are known by their first body. ``noise_seed`` is that of all noise.
+    Nothing is drawn for what a scene lacks, such as a needle. Of lights, bodies and things there is a value for each,
+    by identifier; an arm and a thread are known by their first body. ``noise_seed`` is that of all noise.
     """
 
     noise_seed: int = 0

@@ -538,10 +538,15 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         self._check_open()
         return self._picture((640, 480)) if self.render_mode == "rgb_array" else None
 
-    def _picture(self, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def dress(self) -> None:
+        """Have cameras of `simulation` show lights, colours and the field of view that were drawn, as `render` does."""
+        self._check_open()
         if self._drawn is not None and not self._dressed:
             dress(self._simulation, self._drawn, self._camera)
             self._dressed = True
+
+    def _picture(self, size: tuple[int, int]) -> NDArray[np.uint8]:
+        self.dress()
         camera = self._simulation.cameras[self._camera]
         picture = camera.capture(size, passes=("rgb",), **self._sensor()).rgb
         assert picture is not None
