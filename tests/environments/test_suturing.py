@@ -478,10 +478,9 @@ def test_episodes_of_made_environments_are_cut_where_the_specification_has_it() 
 
 
 VIEWS = (
-    "arm", "arms", "base_position", "base_rotation", "goal", "needle", "needle_force", "readings", "setpoint",
-    "simulation", "tool_position", "tool_positions",
+    "base_position", "base_rotation", "needle_force", "readings", "setpoint", "tool_position", "tool_positions",
 )  # fmt: skip
-"""What an environment shows of its simulation."""
+"""What an environment tells of now."""
 
 
 @pytest.mark.parametrize("task", sorted(GOALS))

@@ -233,7 +233,6 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
     @property
     def goal(self) -> Goal:
         """What is to be done."""
-        self._check_open()
         return self._goal
 
     @property
@@ -242,19 +241,16 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
 
         With ranges of masses, friction or the needle's size it is another one after each `reset`.
         """
-        self._check_open()
         return self._simulation
 
     @property
     def arm(self) -> PsmArm:
         """The arm that acts, the first of several."""
-        self._check_open()
         return self._arms[0]
 
     @property
     def arms(self) -> tuple[PsmArm, ...]:
         """The arms that act."""
-        self._check_open()
         return self._arms
 
     @property
@@ -286,7 +282,6 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
     @property
     def needle(self) -> int:
         """The body that is handled, such as the needle."""
-        self._check_open()
         return self._goal.body
 
     @property
