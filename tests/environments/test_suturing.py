@@ -480,7 +480,7 @@ def test_episodes_of_made_environments_are_cut_where_the_specification_has_it() 
 VIEWS = (
     "base_position", "base_rotation", "needle_force", "readings", "setpoint", "tool_position", "tool_positions",
 )  # fmt: skip
-"""What an environment tells of now."""
+"""What an environment reports of now."""
 
 
 @pytest.mark.parametrize("task", sorted(GOALS))
