@@ -336,11 +336,6 @@ class Simulation:
         self._parts.plugins.close()
         self._world.close()
 
-    @property
-    def closed(self) -> bool:
-        """Whether it was closed."""
-        return self._closed
-
     def __enter__(self: Simulated) -> Simulated:
         return self
 
