@@ -68,6 +68,7 @@ OURS: dict[str, str] = {
     "cockpit/assets.py:asset": "files of the page",
     "cockpit/assets.py:_page": "files of the page",
     "datasets/lerobot/video.py:encode": "writes",
+    "datasets/probe.py:_answer": "a pipe",
     "datasets/probe.py:probe": "a pipe",
     "datasets/store.py:PartFile.__init__": "writes",
     "datasets/store.py:_sync_folder": "a folder",

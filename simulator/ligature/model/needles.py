@@ -174,14 +174,13 @@ def _sampled(corners: Array, spacing: float) -> Array:
 
 
 def _distances(arc: Arc, points: Array) -> Array:
-    """Distances (n,) of points (n, 3) from an arc."""
-    at = points - arc.centre
-    middle = 0.5 * (arc.begin + arc.end)
-    beyond = (np.arctan2(at @ arc.y, at @ arc.x) - middle + np.pi) % (2.0 * np.pi) - np.pi
-    half = 0.5 * (arc.end - arc.begin)
-    angles = middle + np.clip(beyond, -half, half)
-    nearest = arc.radius * (np.cos(angles)[:, None] * arc.x + np.sin(angles)[:, None] * arc.y)
-    return np.asarray(np.linalg.norm(at - nearest, axis=1))
+    """Distances (n,) of points (n, 3) from an arc: from its circle, or its ends for what is not before it."""
+    at, half, middle = points - arc.centre, 0.5 * (arc.end - arc.begin), 0.5 * (arc.begin + arc.end)
+    across = np.hypot(at @ arc.x, at @ arc.y)
+    before = at @ (math.cos(middle) * arc.x + math.sin(middle) * arc.y) >= math.cos(half) * across
+    ends = np.array([arc.point(0.0), arc.point(arc.length)])
+    beyond = np.linalg.norm(points[:, None] - ends, axis=2).min(axis=1)
+    return np.where(before, np.hypot(across - arc.radius, at @ np.cross(arc.x, arc.y)), beyond)
 
 
 def _inside(corners: Array, place: Array) -> bool:
@@ -195,7 +194,7 @@ def _inside(corners: Array, place: Array) -> bool:
     x, y, z = (np.linalg.norm(side, axis=1) for side in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)
     rest = x * y * z + (a * b).sum(axis=1) * z + (b * c).sum(axis=1) * x + (c * a).sum(axis=1) * y
-    return bool(abs(np.arctan2(volume, rest).sum()) > np.pi)
+    return abs(sum(map(math.atan2, volume.tolist(), rest.tolist()))) > math.pi
 
 
 def _outline(part: Collider) -> Array:
