@@ -103,6 +103,13 @@ def _search_face(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
         _distance_to(parts, c, p, a, b, normal)
         if nx * normal[0] + ny * normal[1] + nz * normal[2] <= -FACING * size:
             return count
+    _at(x, faces, q, 0.5, 0.5, p)
+    half = 0.0
+    for s in range(4):
+        node = faces[q, s]
+        half = max(half, (x[node, 0] - p[0]) ** 2 + (x[node, 1] - p[1]) ** 2 + (x[node, 2] - p[2]) ** 2)
+    if _distance_to(parts, c, p, a, b, normal) - core - math.sqrt(half) > REACH:  # no point of it is nearer
+        return count
     opposed = math.inf
     for s in range(COARSE * COARSE):
         su, sv = (s % COARSE + 0.5) / COARSE, (s // COARSE + 0.5) / COARSE
@@ -163,6 +170,9 @@ def _search_site(field: Field, parts: Parts, work: Solve, c: int, q: int, count:
     p, a, b, normal, best_normal = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     i, j = faces[q, 0], faces[q, 1]
     edge = math.sqrt((x[j, 0] - x[i, 0]) ** 2 + (x[j, 1] - x[i, 1]) ** 2 + (x[j, 2] - x[i, 2]) ** 2)
+    _at(x, faces, q, 0.5, 0.0, p)
+    if _distance_to(parts, c, p, a, b, normal) - 0.5 * edge > REACH:
+        return count
     best, u, step = math.inf, 0.0, 0.5 / COARSE
     for s in range(COARSE if i != j else 1):
         su = (s + 0.5) / COARSE if i != j else 0.0
