@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,16 +24,6 @@ from ligature.datasets.quality import pace
 from typer.testing import CliRunner
 
 from tests.datasets.lerobot_rules import COUNTERS, broken
-
-ROOT = Path(__file__).resolve().parents[2]
-SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
-
-
-@pytest.fixture(scope="module")
-def simulation() -> Iterator[ligature.Simulation]:
-    found = ligature.Simulation(ligature.load(SMALL))
-    yield found
-    found.close()
 
 
 def recorded(path: Path, simulation: ligature.Simulation, lengths: tuple[int, ...], extras: Any = None) -> Path:

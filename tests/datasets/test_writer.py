@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -24,13 +23,6 @@ from ligature.render.target import Exposure
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "scenes" / "suturing_small" / "launch.yaml"
-
-
-@pytest.fixture(scope="module")
-def simulation() -> Iterator[ligature.Simulation]:
-    found = ligature.Simulation(ligature.load(SMALL))
-    yield found
-    found.close()
 
 
 @pytest.fixture(scope="module")

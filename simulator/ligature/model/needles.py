@@ -147,9 +147,8 @@ def _check_shapes(arc: Arc, surfaces: list[Array]) -> None:
     _check_thickness(arc, points)
     for depth in np.linspace(0.0, arc.length, ALONG + 1).tolist():
         place = arc.point(depth)
-        if any(_inside(corners, place) for corners in surfaces):
-            continue
-        if np.sqrt(((points - place) ** 2).sum(axis=1).min()) > arc.length / GAPS:
+        gap = np.sqrt(((points - place) ** 2).sum(axis=1).min())
+        if gap > arc.length / GAPS and not any(_inside(corners, place) for corners in surfaces):
             raise ValueError(f"its shapes leave a gap along an arc of {1e3 * arc.length:.0f} mm")
 
 
