@@ -11,6 +11,7 @@ time.
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -25,7 +26,7 @@ from ligature.environments.hand import SHUT, Hand
 from ligature.environments.knotting import BEYOND, SLOWEST, Knotter
 from ligature.environments.layout import ACTION
 from ligature.environments.reading import ArmReading
-from ligature.environments.tying import AWAY, DRAW, SLOW, Missed
+from ligature.environments.tying import ACROSS, AWAY, DRAW, SLOW, Missed
 from ligature.model.frames import axis_rotation, frame
 from ligature.model.scene import Body, Scene
 from ligature.robots.psm_arm import PsmArm
@@ -61,7 +62,10 @@ DRAWN, TAUT, CLOSE = ((-0.016, -0.002, 0.014), (-0.066, -0.020, 0.020)), 0.4, 0.
 longer than that."""
 
 ENDS, WAY = (3, 12), np.array([-0.2, 0.97, 0.05])
-"""Elements from the right hand between which the free end is seen to run, and how it is to run for the left hand."""
+"""Elements from a hand between which the free end is seen to run, and how it is to run for the other hand."""
+
+ABOUT = 0.8
+"""Radians by which it may run otherwise for the right hand: a left one turned much is in its way."""
 
 OFFERED = np.array([0.005, 0.0255, -0.008])
 """Where the left hand offers the free end to the right one, below the short end, from the vessel."""
@@ -138,20 +142,29 @@ class Knotting(Knotter):
 
     UP, LOCKED, TIGHT = np.array([-0.031, 0.047, 0.039]), 10.0, 0.1
     FURTHER = 5
+    BROUGHT = (*Knotter.BROUGHT[:3], (0.0015, 0.0080, -0.010, ACROSS))
+    IN = 0.012
+    """Taken so near, and through the loop so far from the tissue, that the left tool does not lean over the pad."""
 
     def bring(self) -> Iterator[Array]:
-        """As ever, then the right hand turns about its tool until the free end runs where the left one can take it."""
+        """As ever, with the free end where the left hand can take it."""
         yield from super().bring()
-        T, points, held = self.hands[RIGHT].tool, self.goal.points(), self.end(RIGHT)
+        yield from self.turn(RIGHT)
+
+    def turn(self, number: int, within: float = 0.0) -> Iterator[Array]:
+        """A hand turns about its tool until the free end runs away from the tissue, ``within`` an angle in radians."""
+        T, points, held = self.hands[number].tool, self.goal.points(), self.end(number)
         first, last = (points[held + ahead] for ahead in ENDS)
         x, y, axis = T[:3, :3].T
         angles = [float(np.arctan2(way @ y, way @ x)) for way in (last - first, WAY)]
-        turned = axis_rotation(axis, angles[1] - angles[0]) @ T[:3, :3]
-        yield from self.go(RIGHT, frame(turned, T[:3, 3]), SHUT, SLOW)
+        angle = math.remainder(angles[1] - angles[0], 2.0 * math.pi)
+        turned = axis_rotation(axis, math.copysign(max(abs(angle) - within, 0.0), angle)) @ T[:3, :3]
+        yield from self.go(number, frame(turned, T[:3, 3]), SHUT, SLOW)
 
     def under(self) -> Iterator[Array]:
-        """As ever, then the left hand moves until what the right one is to take is where that reaches it."""
+        """As ever, then the left hand turns and moves until what the right one is to take is where that reaches it."""
         yield from super().under()
+        yield from self.turn(LEFT, ABOUT)
         away = self.goal.vessel + OFFERED - self.goal.points()[self.beyond(LEFT, BEYOND)]
         yield from self.go(LEFT, self.moved(LEFT, *away), SHUT, SLOW)
 

@@ -33,17 +33,8 @@ BESIDE = 7
 AWAY, ALONG, ACROSS = np.array([0.0, -1.0, 0.0]), np.array([0.0, -1.0, -0.1]), np.array([-0.8, -0.3, 0.2])
 """Directions of the long end beyond a hand: back along the short end, the same a little down, and below it."""
 
-BROUGHT = (
-    (0.010, 0.040, 0.006, ALONG), (0.009, 0.037, -0.010, ALONG), (0.010, 0.030, -0.010, ACROSS),
-    (0.0015, 0.0135, -0.010, ACROSS),
-)  # fmt: skip
-"""Where the right hand brings the long end, from where the short end begins, and how it runs beyond the hand there."""
-
 CARRY, DRAW = np.array([-0.5, -0.25, -0.83]), np.array([0.6, -0.5, -0.62])
 """Directions of the right tool that brings the end, and of the left one that draws it."""
-
-IN = 0.009
-"""How far from the vessel the left tool reaches down through the loop."""
 
 APPROACH = ((0.052, 1.0), (0.026, 1.0), (0.010, 0.6))
 """How far it stands back along itself on its way, and shares of an action with which it goes there."""
@@ -85,6 +76,15 @@ def shorter(T: Array, tool: Array) -> Array:
 class Tier:
     """Both hands, and the thread."""
 
+    BROUGHT = (
+        (0.010, 0.040, 0.006, ALONG), (0.009, 0.037, -0.010, ALONG), (0.010, 0.030, -0.010, ACROSS),
+        (0.0015, 0.0135, -0.010, ACROSS),
+    )  # fmt: skip
+    """Where the right hand brings the long end, from where the short end begins, and how it runs beyond the hand there."""
+
+    IN = 0.009
+    """How far from the vessel the left tool reaches down through the loop."""
+
     FURTHER = 0
     """Elements by which a hand takes the thread further from the other one each time that it missed it."""
 
@@ -115,7 +115,7 @@ class Tier:
 
     def bring(self) -> Iterator[Array]:
         """The right hand lays the long end over the short one, and brings it below that."""
-        for x, y, z, along in BROUGHT:
+        for x, y, z, along in self.BROUGHT:
             yield from self.go(RIGHT, holding(CARRY, along, self.goal.short + [x, y, z]), SHUT, SLOW)
 
     def through(self) -> Iterator[Array]:
@@ -162,10 +162,10 @@ class Tier:
 
     def gap(self) -> Array:
         """The middle (3,) of the loop beside the vessel: between the short end and the strand on its other side."""
-        points, count = self.goal.points(), round(IN / self.goal.length)
+        points, count = self.goal.points(), round(self.IN / self.goal.length)
         ahead, low, last = points[:, 1] - self.goal.vessel[1], self.goal.beside(points), self.end(RIGHT)
         strand = np.arange(self.goal.leaves(points), last)
-        beyond = strand[ahead[strand] > IN]
+        beyond = strand[ahead[strand] > self.IN]
         return np.asarray(0.5 * (points[low - count] + points[beyond[0] if len(beyond) else strand[0]]))
 
     def laced(self) -> bool:
