@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ligature.environments.goals import FirstThrow, KnotTie
 from ligature.environments.goals.ligating import LEFT, LYING, RIGHT, Ligating
 from ligature.environments.knotting import Knotter
-from ligature.environments.suturing import _scene
+from ligature.environments.options import task_scene
 from ligature.environments.tying import TRIES, Missed, shorter
 from ligature.model.frames import frame
 from scipy.spatial.transform import Rotation
@@ -22,7 +22,7 @@ from tests.tasks.test_knots import CENTRE, HITCHED, hitched
 
 @pytest.fixture(scope="module")
 def goal() -> Iterator[FirstThrow]:
-    simulation = ligature.Simulation(_scene("first_throw", FirstThrow.arms))
+    simulation = ligature.Simulation(task_scene("first_throw", FirstThrow.arms))
     yield FirstThrow(simulation, [simulation.arms[name] for name in FirstThrow.arms])  # type: ignore[misc]
     simulation.close()
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -18,11 +17,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from ligature.bundle import SCENES
 from ligature.camera_simulation import Simulation
 from ligature.environments import layout
 from ligature.environments.actions import ArmActions
 from ligature.environments.goals import GOALS, Goal, Progress
+from ligature.environments.options import RENDER_MODES, arm_names, check_options, difference, psm_of, task_scene
 from ligature.environments.randomisation import Drawn, Randomisation
 from ligature.environments.reading import ArmReading, write_on_side
 from ligature.environments.variation import Channel, dress, place, varied
@@ -42,9 +41,6 @@ SUCCESS_REWARD = 1.0
 
 CAMERA = "cameraL"
 """What shows an environment by default; a scene without it can be simulated, but not drawn."""
-
-MOST_PIXELS = 16384
-"""Of a side of a picture."""
 
 TRIES = 20
 """How often an episode is drawn anew whose start cannot be simulated, such as one with a needle too smooth to hold."""
@@ -144,7 +140,7 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         ranges of masses, friction or the needle's size each `reset` makes another `simulation`.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012 (as the base class)
+    metadata: dict[str, Any] = {"render_modes": [*RENDER_MODES], "render_fps": 50}  # noqa: RUF012 (as the base class)
 
     def __init__(
         self,
@@ -161,25 +157,10 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         randomise: Randomisation | Mapping[str, Any] | str | Path | None = None,
     ) -> None:
         self._options = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
-        for name, value, allowed in (
-            ("task", task, tuple(GOALS)), ("action", action, ("cartesian", "joint")),
-            ("observation", observation, ("state", "image", "both")), ("reward", reward, ("dense", "sparse")),
-        ):  # fmt: skip
-            if not isinstance(value, str) or value not in allowed:
-                raise ValueError(f"{name} must be one of {', '.join(allowed)}, not '{value}'")
-        if (
-            len(np.shape(size)) != 1
-            or len(size) != 2
-            or not all(isinstance(n, int | np.integer) and 0 < n <= MOST_PIXELS for n in size)
-        ):
-            raise ValueError(f"size is a width and a height in pixels, 1 to {MOST_PIXELS} each, not {size!r}")
-        if max_steps is not None and (not isinstance(max_steps, int | np.integer) or max_steps < 1):
-            raise ValueError(f"max_steps is a number of actions, at least 1, or None for no end, not {max_steps!r}")
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"render_mode must be None or rgb_array, not {render_mode!r}")
+        check_options(task, action, observation, reward, size, max_steps, render_mode)
         self._randomisation = self._options["randomise"] = Randomisation.of(randomise)
-        names = _arms(task, arm)
-        self._scene = _scene(task, names) if scene is None else load(scene)
+        names = arm_names(task, arm)
+        self._scene = task_scene(task, names) if scene is None else load(scene)
         self._arm_names, self._action, self._observation = names, action, observation
         self._dense, self._camera, self._size, self._most = reward == "dense", camera, size, max_steps
         self.render_mode = render_mode
@@ -199,7 +180,7 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         """Simulate ``scene`` up to where episodes begin."""
         self._simulation = Simulation(scene)
         try:
-            self._arms = tuple(_psm(self._simulation, name) for name in self._arm_names)
+            self._arms = tuple(psm_of(self._simulation, name) for name in self._arm_names)
             self._readings = tuple(ArmReading(self._simulation, arm) for arm in self._arms)
             self._hands = tuple(
                 ArmActions(arm, reading, self._action) for arm, reading in zip(self._arms, self._readings, strict=True)
@@ -465,7 +446,7 @@ the first throw, the square knot, and both ends drawn (``knot_tie``) | |
         for name in ("task", "scene", "arm", "randomise"):
             theirs, own = state.options[name], self._options[name]
             if theirs != own:
-                raise ValueError(f"the state has {_difference(name, theirs, own)}")
+                raise ValueError(f"the state has {difference(name, theirs, own)}")
         if state.drawn is not None:
             self._take(state.drawn)
         self._simulation.restore(state.snapshot)
@@ -573,53 +554,6 @@ def _bound(action: Array) -> None:
     for k in range(action.shape[0]):
         value = action[k]
         action[k] = 0.0 if value != value else min(max(value, -1.0), 1.0)
-
-
-def _arms(task: str, given: str | Sequence[str] | None) -> tuple[str, ...]:
-    """Names of the arms that act; ValueError where the task needs more or fewer."""
-    own = GOALS[task].arms
-    if not isinstance(given, str | Sequence | None):
-        raise TypeError(f"arm is {given!r}; it must be the name of an arm, or a list of names")
-    names = own if given is None else (given,) if isinstance(given, str) else tuple(given)
-    if len(names) != len(own) or len(set(names)) != len(names):
-        wanted = f"{len(own)} arm{'s' * (len(own) > 1)}, such as {', '.join(own)}"
-        raise ValueError(f"{task} is done by {wanted}, not by {', '.join(names) or 'none'}")
-    return names
-
-
-def _psm(simulation: Simulation, name: str) -> PsmArm:
-    arm = simulation.arms[name]
-    if not isinstance(arm, PsmArm):
-        known = [other for other, found in simulation.arms.items() if isinstance(found, PsmArm)]
-        raise ValueError(f"'{name}' is not a PSM; choose one of {', '.join(known) or 'none'}")
-    return arm
-
-
-@cache
-def _scene(task: str, arms: tuple[str, ...]) -> Scene:
-    """What a task needs of its scene; all of it when other arms than the task's own are asked for."""
-    goal = GOALS[task]
-    path = SCENES / goal.scene / "launch.yaml"
-    if arms != goal.arms:
-        return load(path)
-    scene = load(path, goal.models)
-    scene = replace(scene, arms=tuple(found for found in scene.arms if found.name in arms))
-    if goal.thread:
-        return scene
-    fixed = {needle.body for needle in scene.needles}
-    bodies = tuple(replace(body, mass=0.0) if body.index in fixed else body for body in scene.bodies)
-    return replace(scene, bodies=bodies, rods=())
-
-
-def _difference(name: str, theirs: Any, own: Any) -> str:
-    """How the option ``name`` of a state differs from the own one; of ranges, those that do."""
-    if not (isinstance(theirs, Randomisation) and isinstance(own, Randomisation)):
-        first, second = (given.as_dict() if isinstance(given, Randomisation) else given for given in (theirs, own))
-        return f"{name}={first!r}, not {second!r}"
-    ranges, others = theirs.as_dict(), own.as_dict()
-    differing = [each for each in {**ranges, **others} if ranges.get(each) != others.get(each)]
-    first, second = (", ".join(f"{each}={given.get(each)}" for each in differing) for given in (ranges, others))
-    return f"{name} with {first}, not {second}"
 
 
 def _made(options: Mapping[str, Any], state: EnvState | None) -> SuturingEnv:

@@ -80,7 +80,7 @@ class Tier:
         (0.010, 0.040, 0.006, ALONG), (0.009, 0.037, -0.010, ALONG), (0.010, 0.030, -0.010, ACROSS),
         (0.0015, 0.0135, -0.010, ACROSS),
     )  # fmt: skip
-    """Where the right hand brings the long end, from where the short end begins, and how it runs beyond the hand there."""
+    """Where the right hand brings the long end, from where the short end begins, and how it runs beyond it there."""
 
     IN = 0.009
     """How far from the vessel the left tool reaches down through the loop."""

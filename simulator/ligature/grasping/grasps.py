@@ -117,6 +117,8 @@ class Grasps(Subsystem, Mapping[str, Held | None]):
         self._fields, self._written_empty = FieldViews(), False
         if scene.jaws:
             warm_up()
+            for rod in rods.rods:
+                rod.warm_up()
 
     def __getitem__(self, name: str) -> Held | None:
         return self._held(self._index(name))

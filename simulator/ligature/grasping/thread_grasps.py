@@ -56,13 +56,13 @@ def begin(number: int, rods: Rods, world: World, fingers: Fingers, friction: flo
     lever = centre - pivot
     lever = lever - (lever @ axis) * axis
     normal = fingers.closing(0, axis, lever)
-    element, on_rod, tangent = _nearest(rod, centre)
+    element, on_rod, tangent, at = rod.nearest(centre)
     along = tangent - (tangent @ normal) * normal
     along *= 0.5 * jaw.half_width / max(float(np.linalg.norm(along)), 1e-12)
     T = pose7_matrix(world.motion(jaw.fingers[0])[0])
     points = (np.array([on_rod - along, on_rod + along]) - T[:3, 3]) @ T[:3, :3]
     return ThreadGrasp(
-        number, rod.description.bodies[element], _along(rod, element, on_rod), fingers.positions(),
+        number, rod.description.bodies[element], at, fingers.positions(),
         float(np.linalg.norm(lever)), points, T[:3, :3].T @ normal, friction, jaw.half_width,
     )  # fmt: skip
 
@@ -72,12 +72,12 @@ def keep(thread: ThreadGrasp, rods: Rods, world: World, fingers: Fingers) -> Jaw
     rod, finger = rods.rods[thread.rod], fingers.jaw.fingers[0]
     force = min(fingers.efforts()) / max(thread.lever, LEAST_LEVER)
     T = pose7_matrix(world.motion(finger)[0])
-    centre = T[:3, :3] @ thread.points.mean(axis=0) + T[:3, 3]
-    element, on_rod, _ = _nearest(rod, centre)
+    centre = T[:3, :3] @ (0.5 * (thread.points[0] + thread.points[1])) + T[:3, 3]
+    element, on_rod, _, along = rod.nearest(centre)
     if force <= 0.0 or np.linalg.norm(on_rod - centre) > thread.reach:
         return None
     thread.normal_force, thread.body = force, rod.description.bodies[element]
-    thread.slip = _along(rod, element, on_rod) - thread.along
+    thread.slip = along - thread.along
     thread.force = rod.grasped(finger)[1]
     fingers.stop(thread.positions, (force * thread.lever, force * thread.lever))
     rods.exclude(thread.rod, fingers.jaw.fingers, element)
@@ -108,21 +108,3 @@ def _touched(rod: Rod, fingers: Fingers, finger: int, axis: Array, pivot: Array)
     if not len(rows) or not (contacts.closed[rows].any() or contacts.gap[rows].min() < TOUCH):
         return None
     return np.asarray(points.mean(axis=0))
-
-
-def _nearest(rod: Rod, point: Array) -> tuple[int, Array, Array]:
-    """The element nearest to ``point`` (3,), its point nearest to it, and its direction, world axes."""
-    e = int(np.argmin(np.linalg.norm(rod.positions - point, axis=1)))
-    R = pose7_matrix(np.concatenate([rod.positions[e], rod.orientations[e]]))[:3, :3]
-    a, b = rod.description.ends[e] @ R.T + rod.positions[e]
-    s = float(np.clip((point - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0))
-    return e, a + s * (b - a), (b - a) / np.linalg.norm(b - a)
-
-
-def _along(rod: Rod, element: int, point: Array) -> float:
-    """Arc length in metres from the start of a rod to a point (3,) on an element."""
-    ends = rod.description.ends
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    R = pose7_matrix(np.concatenate([rod.positions[element], rod.orientations[element]]))[:3, :3]
-    first = R @ ends[element, 0] + rod.positions[element]
-    return float(lengths[:element].sum() + np.linalg.norm(point - first))

@@ -73,8 +73,10 @@ class Exclusions:
 
     def between_pads(self, parts: slice, elements: Flags | None) -> None:
         """Exclude ``elements`` (n,) from the parts of a jaw; None ends that."""
-        self._pads[parts] = False if elements is None else elements
-        self._write()
+        wanted = False if elements is None else elements
+        if not (self._pads[parts] == wanted).all():
+            self._pads[parts] = wanted
+            self._write()
 
     def _write(self) -> None:
         self._any = bool(self._inside.any())

@@ -39,6 +39,10 @@ class JawPads:
     normal: Array
     limit: float
 
+    def is_as(self, other: JawPads) -> bool:
+        """Whether they differ from ``other`` pads by the limit at most."""
+        return self.body == other.body and self.points is other.points and self.normal is other.normal
+
 
 @dataclass(frozen=True, eq=False)
 class PointConstraint:

@@ -20,11 +20,11 @@ from ligature.suture.assembly import Numbering, chain_joints, chain_nodes, grasp
 from ligature.suture.bodies import Bodies
 from ligature.suture.colliders import Colliders
 from ligature.suture.description import Attachment, RodDescription
+from ligature.suture.grasped import assign, force_of, nearest
 from ligature.suture.parting import depth_of, draw_out, find_inside
 from ligature.suture.partners import JawPads, Partner, PointConstraint
 from ligature.suture.passages import Passages, passages
 from ligature.suture.placing import Elements, bounds, sound, write_elements
-from ligature.suture.point_constraints import FIRST_GRASP_KEY
 from ligature.suture.releasing import Releases
 from ligature.suture.springs import CAPACITY, read_other_loads, springs
 from ligature.suture.ticking import RodTick, tick_rod
@@ -98,6 +98,7 @@ class Rod:
         self._touch_tables = np.array([table_of(touches) for touches in self._buffers])
         self._order = np.arange(3)
         lengths = np.linalg.norm(description.ends[:, 1] - description.ends[:, 0], axis=1)
+        self._starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
         self.self_skip = 1 + int(np.ceil(np.pi * description.radius.max() / lengths.min()))
         self._arrays = layout.rod_arrays(
             self._nodes, self.joints, self.shapes, layout.work(self._chain, self._total, n, capacity), self._first,
@@ -424,9 +425,14 @@ class Rod:
 
     def set_pads(self, pads: Sequence[JawPads]) -> None:
         """Grasp the elements between ``pads`` from now on, and no others."""
-        if [p.body for p in pads] != [p.body for p in self._pads]:
+        before, self._pads = self._pads, tuple(pads)
+        if len(before) == len(pads) and all(map(JawPads.is_as, pads, before)):
+            limits = [p.limit / len(p.points) for p in pads for _ in p.points]
+            points = self._constraint_rows[1]
+            points[len(points) - len(limits) :, 2, 0, 0] = limits
+            return
+        if [p.body for p in pads] != [p.body for p in before]:
             self._near = None
-        self._pads = tuple(pads)
         self._constraint_rows = self._gather_constraints()
 
     def _gather_constraints(self) -> tuple[NDArray[np.int64], Array]:
@@ -440,23 +446,30 @@ class Rod:
 
     def _find_grasped(self) -> None:
         """Assign to every grasp the element nearest to its point."""
-        constraints, points = self._constraint_rows
-        rows = np.flatnonzero(constraints[:, 2])
-        for row in rows:
-            k = constraints[row, 1]
-            at = self._nodes.x[k] + quaternion_matrix(self._nodes.q[k]) @ points[row, 0, 1]
-            constraints[row, 0] = self._first + int(np.argmin(np.linalg.norm(self.positions - at, axis=1)))
+        x, q, own = self._nodes.x, self._nodes.q, len(self.positions)
+        assign(*self._constraint_rows, self._first, own, x, q, np.zeros((3, 3)))
+
+    def nearest(self, point: Array) -> tuple[int, Array, Array, float]:
+        """The element nearest to ``point`` (3,), its point nearest to it, its direction, and the arc length there."""
+        out, d = np.zeros(7), self.description
+        element = int(nearest(self.positions, self.orientations, d.ends, self._starts, point, np.zeros((3, 3)), out))
+        return element, out[:3], out[3:6], float(out[6])
 
     def grasped(self, body: int) -> tuple[int, Array]:
         """Element between the pads of a body, -1 for none, and force (3,) of the pads on the rod in the last tick."""
-        touches = self._touches[0]
-        rows = np.flatnonzero(
-            touches.bilateral[: touches.count[0]] & (touches.key[: touches.count[0]] <= FIRST_GRASP_KEY)
-        )
-        rows = rows[touches.node[rows, 1] == self.node_of[body]]
-        if not len(rows):
-            return -1, np.zeros(3)
-        return int(touches.node[rows[0], 0]) - self._first, touches.force[rows].sum(axis=0)
+        held, force = self._grasped_by(self.node_of[body])
+        return (held - self._first if held >= 0 else -1), force
+
+    def _grasped_by(self, node: int) -> tuple[int, Array]:
+        """The node between the pads of another node, -1 for none, and their force (3,) on it."""
+        t, force = self._touches[0], np.zeros(3)
+        return int(force_of(node, int(t.count[0]), t.key, t.node, t.bilateral, t.force, force)), force
+
+    def warm_up(self) -> None:
+        """Compile what a grasp takes, or load it from the cache, so that the first one does not wait."""
+        self.nearest(np.zeros(3))
+        self._find_grasped()
+        self._grasped_by(0)
 
     def pushes(self) -> list[tuple[int, Array]]:
         """Movable partners that the last tick pushed, with impulse and moment (6,) about their centre."""
