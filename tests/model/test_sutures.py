@@ -212,6 +212,36 @@ def test_data_that_make_no_thread_are_reported(tmp_path: Path, old: str, new: st
     assert text in "\n".join(str(d) for d in scene.diagnostics if d.severity >= Severity.ERROR)
 
 
+VALUES = st.one_of(
+    st.sampled_from([0.0, -1.0, 0.5, -0.5]),
+    st.builds(lambda sign, power: sign * 10.0**power, st.sampled_from([-1.0, 1.0]), st.floats(-9.0, 11.0)),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    key=st.sampled_from(["density", "youngs modulus", "poisson ratio", "damping time", "yield strain", "friction"]),
+    value=VALUES,
+)
+def test_a_number_of_a_thread_is_refused_by_its_name_or_makes_one_that_falls(
+    key: str, value: float, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    numbers = {"density": 1000.0, "youngs modulus": 1e8, key: value}
+    block = ", ".join(f"{name}: {number!r}" for name, number in numbers.items())
+    text = f"{NEEDLE}SUTURE silk: {{name: silk, length: 0.1, USP size: 2-0, elements: 20, {block}}}\n"
+    scene = load(tmp_path_factory.mktemp("thread"), text)
+    errors = [str(found) for found in scene.diagnostics if found.severity >= Severity.ERROR]
+    if errors:
+        assert f"'{key}'" in errors[0]
+        assert not scene.rods
+        return
+    simulation = Simulation(scene)
+    simulation.step(100)
+    twists = simulation.state[0]["body_twist"][list(scene.rods[0].bodies)]
+    assert twists[:, 2] == pytest.approx(-0.981, rel=0.05)
+    simulation.close()
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_a_thread_leads_along_its_way_and_straight_on_beyond_it(seed: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(seed)

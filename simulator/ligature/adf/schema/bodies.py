@@ -351,13 +351,15 @@ SUTURE = (
     Key("length", N, unit="m", doc="length of the thread", required=True),
     Key("diameter", N, unit="m", doc="diameter; or give `USP size`"),
     Key("USP size", T, "", doc="such as 2-0"),
-    Key("density", N, 1200.0, "kg/m³", "density", least=0.0),
-    Key("youngs modulus", N, 2.0e9, "Pa", "Young's modulus"),
-    Key("poisson ratio", N, 0.4, doc="ratio that gives the shear modulus"),
-    Key("damping time", N, 0.002, "s", "bending damping over bending stiffness"),
+    Key("density", N, 1200.0, "kg/m³", "density", least=0.0, above=True),
+    Key("youngs modulus", N, 2.0e9, "Pa", "Young's modulus", least=0.0, above=True),
+    Key(
+        "poisson ratio", N, 0.4, doc="ratio that gives the shear modulus, at most 0.5", least=-1.0, most=0.5, above=True
+    ),
+    Key("damping time", N, 0.002, "s", "bending damping over bending stiffness", least=0.0),
     Key("yield strain", N, doc="strain at the surface above which a bend is permanent; elastic when absent", least=0.0),
     Key("elements", U, 40, doc="number of elements"),
-    Key("friction", N, 0.3, doc="friction coefficient"),
+    Key("friction", N, 0.3, doc="friction coefficient", least=0.0),
     Key("location", POSE, POSE_ZERO, "m, rad", "pose of the start; the thread leaves along +z"),
     Key("parent", T, "", doc="body that the start is fixed to; `location` is then in its frame"),
     Key(
