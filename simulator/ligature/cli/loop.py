@@ -7,6 +7,7 @@ import ctypes
 import gc
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -40,6 +41,12 @@ ALARM_BYTES = 240
 
 MOST_NOTED = 8
 """Findings a second that `/diagnostics` gets, the worst ones."""
+
+MOST_PRINTED = 5
+"""Findings a second that are printed, the worst ones."""
+
+REPEAT = 2.0
+"""Seconds until the same finding is printed again."""
 
 WINDOW = 1000
 """Updates over which the loop's figures are taken."""
@@ -99,6 +106,7 @@ class Loop:
         self._updates = 0
         self._mark_updates = 0
         self._warned = 0
+        self._told: dict[str, float] = {}
 
     def end(self) -> None:
         """The run is over."""
@@ -183,9 +191,17 @@ class Loop:
             if problem.code in ALARMS:
                 figures["alarms"] += 1
                 figures["alarm"] = printable(problem).encode("utf-8")[:ALARM_BYTES]
-        worst = sorted(self._simulation.problems, key=lambda problem: -problem.severity)
-        for problem in reversed(worst[:MOST_NOTED]):
-            self._block.note(problem.severity, str(problem))
-        for problem in self._simulation.problems[:5]:
-            report("warning", str(problem))
+        self._tell(now)
         self._simulation.problems.clear()
+
+    def _tell(self, now: float) -> None:
+        """Note and print what went wrong, the worst first: a client may repeat what fails a thousand times a second."""
+        worst = sorted(self._simulation.problems, key=lambda problem: -problem.severity)
+        severities = {str(problem): problem.severity for problem in worst}
+        times = Counter(map(str, worst))
+        for text in reversed(list(severities)[:MOST_NOTED]):
+            self._block.note(severities[text], text)
+        self._told = {text: at for text, at in self._told.items() if now - at < REPEAT}
+        for text in [text for text in severities if text not in self._told][:MOST_PRINTED]:
+            self._told[text] = now
+            report("warning", text if times[text] == 1 else f"{text} ({times[text]} times)")
