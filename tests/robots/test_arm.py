@@ -240,12 +240,26 @@ def test_another_instrument_brings_its_own_limits(ready: PsmArm, reported: Repor
 def test_without_its_tool_an_arm_is_not_homed(ready: PsmArm) -> None:
     ready.emulate_tool_present(False)
     assert not ready.is_homed
-    with pytest.raises(Rejected, match="not homed"):
-        ready.move_jp(np.zeros(6))
-    ready.emulate_tool_present(True)
     ready.home()
     advance(ready, 1.0)
+    assert not ready.is_homed
+    for act in (lambda: ready.move_jp(np.zeros(6)), lambda: ready.jaw.servo_jp(0.2), ready.hold):
+        with pytest.raises(Rejected, match="has no tool; arm not ready: send true to 'emulate_tool_present'"):
+            act()
+    ready.emulate_tool_present(True)
     assert ready.is_homed
+    ready.move_jp(np.zeros(6))
+
+
+def test_an_arm_that_homes_without_its_tool_is_homed_with_it(psm: PsmArm) -> None:
+    psm.emulate_tool_present(False)
+    psm.home()
+    advance(psm, 5.0)
+    assert not psm.is_homed
+    psm.emulate_tool_present(True)
+    assert psm.is_homed
+    psm.unhome()
+    assert not psm.is_homed
 
 
 @pytest.mark.parametrize("ratio", [0.0, -1.0, 1.5])

@@ -129,13 +129,22 @@ class PsmArm(Arm):
     def emulate_tool_present(self, present: bool) -> None:
         """Pretend that the instrument was put on or taken off; without it only the first joints may move."""
         self.tool_present = bool(present)
-        self._homed = self._homed and self.tool_present
         self._emit_state()
         if present:
             self.emit("tool_type", self.tool_type)
 
+    @property
+    def is_homed(self) -> bool:
+        """See `Device.is_homed`; an arm without its tool is not homed until the tool is back."""
+        return self.tool_present and super().is_homed
+
+    def _require_joints(self, what: str) -> None:
+        super()._require_joints(what)
+        if not self.tool_present and not self._direct:
+            raise Rejected(f"{what}: {self.name} has no tool; arm not ready: send true to 'emulate_tool_present'")
+
     def _finish_home(self) -> None:
-        self._homed = self.tool_present
+        super()._finish_home()
         self.emit("desired_state", "TOOL_ENGAGED" if self.tool_present else "HOMED")
 
     def _groups(self) -> tuple[Axes, ...]:
