@@ -29,7 +29,7 @@ from ligature.ros import conversion, names, tissue
 from ligature.ros.arms import ArmsNode
 from ligature.ros.diagnostics import Diagnostics
 from ligature.ros.intake import oversized
-from ligature.ros.master import NO_ANSWER, MasterWatch, node_name
+from ligature.ros.master import NO_ANSWER, MasterWatch, node_name, takes_time_from_clock
 from ligature.ros.pace import PaceServices
 from ligature.ros.parameters import Parameters
 from ligature.ros.plugins import PluginTemplate, plugin_templates, subscribe_plugins
@@ -218,12 +218,18 @@ class Node:
 
 
 def _report_unreachable() -> None:
-    """Log whether others may not reach this node, and which nodes that do not answer are registered for its topics.
+    """Log why others may not reach this node or may wait for ever, and which nodes of its topics do not answer.
 
     Each may take seconds to find out.
     """
     if problem := address_problem(rospy.get_node_uri(), rosgraph.get_master_uri()):
         rospy.logwarn(problem)
+    with suppress(*NO_ANSWER):
+        if takes_time_from_clock():
+            rospy.logwarn(
+                "/use_sim_time is true: stamps of this run are of the wall clock all the same, and it publishes no "
+                "/clock, so that programs may wait for one; set the parameter to false before they start"
+            )
     manager = get_topic_manager()
     topics = [topic for topic, _ in (*manager.get_publications(), *manager.get_subscriptions())]
     with suppress(*NO_ANSWER):  # the watch of the master reports it

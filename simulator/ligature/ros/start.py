@@ -32,7 +32,7 @@ def start_node(name: str, several: bool = False) -> None:
     """Make this process the node ``name``, which takes `WAITING` connections at once and no message of any length.
 
     With ``several`` its name gets an ending of its own, so that many may run side by side. The name is in no namespace.
-    Signals stay the caller's.
+    Signals stay the caller's. Its time is the wall clock whatever ``/use_sim_time`` is, for states are stamped by it.
     Raises `ligature.ros.registrations.NameTaken`.
     """
     _allow_files()
@@ -41,7 +41,7 @@ def start_node(name: str, several: bool = False) -> None:
     ThreadingXMLRPCServer.request_queue_size = WAITING
     bound_messages()
     give_up_publishers()
-    rospy.init_node(name, anonymous=several, disable_signals=True)
+    rospy.init_node(name, anonymous=several, disable_signals=True, disable_rostime=True)
     namespace = os.environ.get("ROS_NAMESPACE", "").strip("/")
     if namespace and not several:
         rospy.logwarn(f"ROS_NAMESPACE '{namespace}' has no effect: topics are those of AMBF; --ns gives them a prefix")

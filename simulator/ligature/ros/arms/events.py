@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -135,8 +137,8 @@ class EventTopics:
         """Whether a warning of an arm that is not ready was published a moment ago."""
         if NOT_READY not in warning:
             return False
-        now = rospy.get_time()
-        if now - self._warned.get(warning, 0.0) < WARNING_PAUSE:
+        now = time.monotonic()
+        if now - self._warned.get(warning, -math.inf) < WARNING_PAUSE:
             return True
         self._warned = {text: at for text, at in self._warned.items() if now - at < WARNING_PAUSE} | {warning: now}
         return False
@@ -145,8 +147,8 @@ class EventTopics:
         """Errors go to the log as well, the same one at most every two seconds."""
         if name not in _LOGS:
             return
-        now = rospy.get_time()
-        if now - self._logged.get(value, 0.0) > WARNING_PAUSE:
+        now = time.monotonic()
+        if now - self._logged.get(value, -math.inf) > WARNING_PAUSE:
             self._logged = {text: at for text, at in self._logged.items() if now - at < WARNING_PAUSE}
             self._logged[value] = now
             direct = value.startswith(f"{CHALLENGE}/")  # names its topic, which is not below this arm's
