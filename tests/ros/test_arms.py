@@ -483,6 +483,23 @@ def between(pose: np.ndarray, local: np.ndarray) -> np.ndarray:
     return pose7_matrix(pose) @ inverse(pose7_matrix(local))
 
 
+@pytest.mark.parametrize("position", [[np.nan], [], [0.1, 0.2], [1e300]], ids=str)
+def test_a_move_of_the_jaw_that_is_invalid_has_not_reached_its_goal(arms, position, listen):
+    """Whether the ROS process rejects it for its numbers, or the arm for its length."""
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import Bool
+
+    psm = at_home(arms["PSM1"])
+    reached = listen(psm.topic("goal_reached"), Bool)
+    assert psm.jaw.move_jp(0.2).wait(timeout=5.0)
+    reached.wait(lambda message: message.data)
+    reached.messages.clear()
+    psm.jaw.send("move_jp", JointState(position=position))
+    until(lambda: reached.messages, "an answer to the move")
+    assert [message.data for message in reached.messages] == [False]
+    assert psm.jaw.setpoint_jp() == pytest.approx(0.2)
+
+
 @pytest.mark.parametrize("name", ["PSM1", "PSM2"])
 def test_a_jaw_opens_and_closes(arms, name):
     psm = at_home(arms[name])

@@ -72,7 +72,7 @@ class ArmCommand(Command):
     @property
     def moves(self) -> bool:
         """Whether the arm answers with ``goal_reached``."""
-        return self.verb.rpartition("/")[2].startswith("move_")
+        return is_move(self.verb)
 
     def carry_out(self, arm: Arm) -> None:
         """Have ``arm`` do it; raises `Rejected` with the reason when it does not."""
@@ -83,6 +83,11 @@ class ArmCommand(Command):
     def _call(self, arm: Any) -> None:
         """Call the arm's method with the fields in their order."""
         getattr(arm, self._method)(*[getattr(self, name) for name, _, _ in self.fields()[1:]])
+
+
+def is_move(verb: str) -> bool:
+    """Whether a verb such as ``jaw/move_jp`` has a goal that ``goal_reached`` reports."""
+    return verb.rpartition("/")[2].startswith("move_")
 
 
 VERBS: dict[str, type[Any]] = {}

@@ -23,7 +23,7 @@ from ligature.model.commands import Command
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import ArmKind, Scene
 from ligature.robots.arm import NO_COMMON_RATIO
-from ligature.robots.commands import ArmCommand
+from ligature.robots.commands import ArmCommand, is_move
 from ligature.robots.instruments import INSTRUMENTS
 from ligature.ros.arms.bases import CART, BaseFrames
 from ligature.ros.arms.challenge import ChallengeFace
@@ -240,7 +240,7 @@ class ArmsNode:
             except (ValueError, CodecError) as error:
                 self.rejected += 1
                 outlet.events.publish("warning", f"{topic}: command rejected: {error}")
-                if topic.startswith("move"):
+                if is_move(topic):
                     outlet.events.publish("goal_reached", False)
 
         return listen
