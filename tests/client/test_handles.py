@@ -184,6 +184,8 @@ def test_a_number_that_is_not_finite_leaves_the_last_command(bad: float, caplog:
     body.set_force(bad, 0, 0)
     body.set_linear_vel(0, bad, 0)
     body.set_rot([0, 0, 0, bad])
+    body.set_rpy(0, bad, 0)
+    body.pose_command(1, 2, 3, bad, 0, 0)
     assert body._cmd.joint_cmds == [0, 0.5] and body._cmd.wrench.force.x == 1 and body._cmd.twist.linear.y == 0
     assert body._cmd.cartesian_cmd_type == FORCE
     assert f"/ambf/env/arm: {bad} are not valid commands; keeping the previous command" in caplog.text

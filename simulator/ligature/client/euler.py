@@ -70,6 +70,8 @@ def _axes(axes: str) -> tuple[bool, tuple[int, int, int]]:
 
 
 def _about(axis: int, angle: float) -> Quaternion:
+    if math.isinf(angle):  # sine and cosine raise for it, and not for NaN
+        angle = math.nan
     q = [0.0, 0.0, 0.0, math.cos(angle / 2)]
     q[axis] = math.sin(angle / 2)
     return (q[0], q[1], q[2], q[3])
