@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -324,3 +325,18 @@ def test_a_restored_arm_goes_on_as_the_other_did(ready: PsmArm) -> None:
     ready.joints.plant.restore(plant)
     advance(ready, 0.5)
     assert (ready.measured_js().position == first).all()
+
+
+def test_a_rejected_servo_cs_names_itself(ready: PsmArm) -> None:
+    for parts in (([0.0] * 7, None, None), (None, [math.nan] * 6, None), (None, None, [math.inf] * 6)):
+        with pytest.raises(Rejected, match="^servo_cs: "):
+            ready.servo_cs(*parts)
+
+
+@pytest.mark.parametrize("name", ["f" * 65, "ü" * 33, "🪡" * 17])
+def test_a_frame_whose_name_has_no_room_is_rejected_and_not_cut_off(ready: PsmArm, name: str) -> None:
+    with pytest.raises(Rejected, match=f"may have 64 bytes, not {len(name.encode())}"):
+        ready.set_base_frame([1, 0, 0, 0, 0, 0, 1], name)
+    assert ready.reference == "" and (ready.base_frame == np.eye(4)).all()
+    ready.set_base_frame([1, 0, 0, 0, 0, 0, 1], name[: 64 // len(name[0].encode())])
+    assert ready.reference

@@ -453,6 +453,24 @@ def test_ratios_are_echoed_and_slow_moves_down(arm, listen):
 
 
 @on_every_arm
+def test_the_frame_of_a_tip_is_no_frame_for_its_own_base(arm, listen):
+    """On /tf the arm would be its own parent."""
+    from geometry_msgs.msg import PoseStamped
+    from std_msgs.msg import String
+
+    from tests.ros.crtk import pose_message
+
+    base = PoseStamped(pose=pose_message([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0]))
+    base.header.frame_id = arm.name
+    before, pose = arm.hear("measured_cp").header.frame_id, arm.measured_cp()
+    warnings = listen(arm.topic("warning"), String)
+    arm.publish("set_base_frame", base)
+    warnings.wait(lambda message: f"'{arm.name}' is the frame of the tip" in message.data)
+    assert arm.hear("measured_cp").header.frame_id == before
+    np.testing.assert_allclose(arm.measured_cp(), pose, atol=1e-3)
+
+
+@on_every_arm
 def test_a_base_frame_moves_poses_and_commands_but_not_local_ones(arm, node):
     from geometry_msgs.msg import PoseStamped
 

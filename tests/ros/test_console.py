@@ -102,6 +102,19 @@ def test_every_pedal_is_pressed_by_emulation_and_reported_by_both_of_its_names(w
             assert len(wires.published[report]) == before[report] + 1 and report in wires.latched
 
 
+def test_a_pedal_without_a_button_is_rejected_with_what_to_send(wires: Wires) -> None:
+    """Programs read the first button of what is reported."""
+    from sensor_msgs.msg import Joy
+
+    console(wires)
+    before = {topic: len(messages) for topic, messages in wires.published.items()}
+    for topic in [topic for topic in wires.heard if topic.startswith("/console/emulate_")]:
+        wires.logged.clear()
+        wires.heard[topic](Joy())
+        assert "send 'buttons: [1]'" in wires.logged[0]
+    assert {topic: len(messages) for topic, messages in wires.published.items()} == before
+
+
 @pytest.mark.parametrize("names", [("select", "unselect"), ("select_teleop", "unselect_teleop")])
 def test_pairs_are_selected_by_the_names_of_the_code_and_of_the_documentation(
     wires: Wires, names: tuple[str, str]

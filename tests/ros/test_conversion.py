@@ -211,3 +211,23 @@ def test_ray_and_contact_sensors_state_what_they_see(tmp_path: Path) -> None:
     assert [sensed.data for sensed in ray.sensed_objects] == ["/ambf/env/BODY Block"]
     assert list(ray.sensed_objects_map) == [0, 255]
     assert (touch.type.data, touch.contact_events) == ("CONTACT", [])
+
+
+@pytest.mark.parametrize("n", [1, 5, 7, 20])
+def test_a_velocity_of_another_length_is_rejected_and_not_left_out(n: int) -> None:
+    from ligature.model.scene import ArmKind
+    from ligature.robots.operating_state import Rejected
+    from ligature.ros.arms.commands import listeners
+    from sensor_msgs.msg import JointState
+
+    from tests.robots.conftest import advance, ideal_psm
+
+    take = {topic: take for topic, _, take in listeners(0, ArmKind.PSM)}["servo_jp"]
+    arm = ideal_psm()
+    arm.home()
+    advance(arm, 3.0)
+    for velocity in ([], [0.1] * 6):
+        take(JointState(position=[0.1] * 6, velocity=velocity)).carry_out(arm)
+    with pytest.raises(Rejected, match=f"servo_jp velocity takes 6 numbers .*, not {n}"):
+        take(JointState(position=[0.2] * 6, velocity=[0.1] * n)).carry_out(arm)
+    assert arm.setpoint_js().position == pytest.approx([0.1] * 6)

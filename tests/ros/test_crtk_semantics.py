@@ -157,6 +157,15 @@ def test_what_the_challenge_s_face_rejects_names_its_topic(
     assert not any("/PSM1: CRTK" in line or "/PSM1: servo_cp" in line for line in program.lines[before:])
 
 
+def test_a_jaw_of_the_challenge_s_face_without_an_angle_is_rejected_in_words(program: Any, node: Any) -> None:
+    from sensor_msgs.msg import JointState
+
+    jaw = node.Publisher("/CRTK/psm1/jaw/servo_jp", JointState, queue_size=1)
+    until(lambda: jaw.get_num_connections(), "the run listens", 20.0)
+    jaw.publish(JointState())
+    program.wait_for("/CRTK/psm1/jaw/servo_jp: command rejected: jaw/servo_jp takes the angle of a finger", 20.0)
+
+
 def test_joints_that_are_out_of_reach_are_clipped_and_the_arm_moves(arms: Any, faces: Any) -> None:
     face = faces["PSM1"]
     face.command_joints("servo_jp", [9.0, 0.0, 0.1, 0.0, 0.0, 0.0])

@@ -30,6 +30,9 @@ CHALLENGE = "CRTK"
 NO_COMMON_RATIO = 0.0
 """What ``trajectory_j/ratio`` reports while velocities and accelerations have ratios of their own (as in the dVRK)."""
 
+MOST_REFERENCE = 64
+"""Bytes of the name of a reference frame: what the state has room for."""
+
 PULL_BACK = 1e-2
 """Damping of the inverse that turns twists into joint velocities: bounded near singular poses."""
 
@@ -411,12 +414,15 @@ class Arm(Device):
 
     def servo_cs(self, pose: ArrayLike | None, twist: ArrayLike | None, wrench: ArrayLike | None) -> None:
         """Follow whichever of pose, twist and wrench is given; none of them is a wrench of zero."""
-        if pose is not None:
-            self.servo_cp(pose)
-        elif twist is not None:
-            self.servo_cv(twist)
-        else:
-            self.body_servo_cf(np.zeros(6) if wrench is None else wrench)
+        try:
+            if pose is not None:
+                self.servo_cp(pose)
+            elif twist is not None:
+                self.servo_cv(twist)
+            else:
+                self.body_servo_cf(np.zeros(6) if wrench is None else wrench)
+        except Rejected as error:  # names what the client sent, too
+            raise Rejected(f"servo_cs: {error}") from error
 
     def _push_with(self, what: str, push: Any) -> None:
         """Apply the joint efforts of the command ``what``, computed anew each tick."""
@@ -448,6 +454,9 @@ class Arm(Device):
 
     def set_base_frame(self, pose: ArrayLike, reference: str) -> None:
         """Set the pose of the base in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
+        size = len(reference.encode("utf-8"))
+        if size > MOST_REFERENCE:  # cut off, it would be the name of another frame
+            raise Rejected(f"set_base_frame: the name of the frame may have {MOST_REFERENCE} bytes, not {size}")
         self._T_reference_base = pose_matrix_of(pose, "set_base_frame")
         self.reference = reference
         self.emit("base_frame", reference)

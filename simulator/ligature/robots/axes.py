@@ -100,7 +100,7 @@ class Axes:
         """``values`` as n numbers; raises `Rejected` when they are not."""
         numbers = np.array(values, dtype=float).reshape(-1)
         if len(numbers) != self.n:
-            raise Rejected(f"{what} takes {self.n} numbers ({', '.join(self.names)}), not {len(numbers)}")
+            raise Rejected(f"{what} takes {_numbers(self.n)} ({', '.join(self.names)}), not {len(numbers)}")
         if not np.isfinite(numbers).all():
             raise Rejected(f"{what} takes finite numbers, not {numbers.tolist()}")
         return numbers
@@ -213,3 +213,7 @@ class Axes:
                 self.plant.restore(value)
             else:
                 setattr(self, name, value)
+
+
+def _numbers(n: int) -> str:
+    return "1 number" if n == 1 else f"{n} numbers"

@@ -154,13 +154,18 @@ class _Psm:
         _listen(f"{root}/servo_jv", JointState, lambda m: self.command("servo_jv", tuple(m.velocity)))
         for verb in ("servo_cp", "servo_cr", "move_cp"):
             _listen(f"{root}/{verb}", PoseStamped, partial(self._pose, verb))
-        _listen(f"{root}/jaw/servo_jp", JointState, lambda m: self.jaw(m.position[0]))
+        _listen(f"{root}/jaw/servo_jp", JointState, self._jaw)
 
     def _joints(self, verb: str, message: Any) -> None:
         self.command(verb, tuple(message.position))
 
     def _pose(self, verb: str, message: Any) -> None:
         self.command(verb, _numbers(message.pose))
+
+    def _jaw(self, message: Any) -> None:
+        if not message.position:
+            raise ValueError("jaw/servo_jp takes the angle of a finger, not an empty position")
+        self.jaw(message.position[0])
 
     def command(self, verb: str, values: tuple[float, ...]) -> None:
         """Send a command, which the arm takes where it stands."""
@@ -232,7 +237,7 @@ def _listen(topic: str, type_: type, take: Callable[[Any], None]) -> None:
     def listen(message: Any) -> None:
         try:
             take(message)
-        except (ValueError, IndexError) as error:
+        except ValueError as error:
             rospy.logwarn_throttle(2.0, f"{topic}: command rejected: {error}")
 
     rospy.Subscriber(topic, type_, listen, queue_size=10, tcp_nodelay=True)

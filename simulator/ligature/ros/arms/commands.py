@@ -38,9 +38,8 @@ def _position(message: Any) -> Fields:
 
 
 def _position_velocity(message: Any) -> Fields:
-    """Positions; velocities too when there are as many."""
-    position, velocity = tuple(message.position), tuple(message.velocity)
-    return position, velocity if len(velocity) == len(position) else None
+    """Positions; velocities too when there are any."""
+    return tuple(message.position), tuple(message.velocity) or None
 
 
 def _velocity(message: Any) -> Fields:
@@ -68,7 +67,7 @@ def _pose(message: Any) -> Fields:
 
 
 def _framed_pose(message: Any) -> Fields:
-    return _seven(message.pose), message.header.frame_id[:64]
+    return _seven(message.pose), message.header.frame_id
 
 
 def _twist(message: Any) -> Fields:

@@ -124,17 +124,22 @@ def console_topics(prefix: str) -> list[str]:
 
 
 def _relay(publishers: Sequence[Any], content: Callable[[Any], Any]) -> Callable[[Any], None]:
-    """What publishes the ``content`` of each message that it is given."""
+    """What publishes the ``content`` of each message that it is given, unless it is None."""
 
     def relay(message: Any) -> None:
-        for publisher in publishers:
-            publisher.publish(content(message))
+        told = content(message)
+        if told is not None:
+            for publisher in publishers:
+                publisher.publish(told)
 
     return relay
 
 
-def _press(message: Any) -> Joy:
-    """A button event of now: 1 pressed, 0 released, 2 clicked."""
+def _press(message: Any) -> Joy | None:
+    """A button event of now: 1 pressed, 0 released, 2 clicked; None without a button, which clients cannot read."""
+    if not message.buttons:
+        rospy.logwarn_throttle(2.0, "console: a pedal needs a button: send 'buttons: [1]' (pressed) or [0] (released)")
+        return None
     event = Joy(buttons=list(message.buttons[:1]))
     event.header.stamp = rospy.Time.now()
     return event

@@ -23,7 +23,7 @@ from ligature.model.commands import Command
 from ligature.model.frames import matrix_pose7
 from ligature.model.scene import ArmKind, Scene
 from ligature.robots.arm import NO_COMMON_RATIO
-from ligature.robots.commands import ArmCommand, is_move
+from ligature.robots.commands import ArmCommand, SetBaseFrame, is_move
 from ligature.robots.instruments import INSTRUMENTS
 from ligature.ros.arms.bases import CART, BaseFrames
 from ligature.ros.arms.challenge import ChallengeFace
@@ -215,9 +215,9 @@ class ArmsNode:
             frames.append(_transform(f"{self._frame_prefix}world", f"{self._frame_prefix}{CART}", world, stamp))
         for outlet in self.outlets:
             body = outlet.description.base
-            record, name = state["arm"][outlet.index], f"{self._frame_prefix}{outlet.description.name}"
+            record = state["arm"][outlet.index]
             parent = record["reference"].decode("utf-8", "replace") or outlet.base_frame
-            frames.append(_transform(parent, name, record["measured_cp"], stamp))
+            frames.append(_transform(parent, outlet.frame, record["measured_cp"], stamp))
             if outlet.description.kind is not ArmKind.MTM:
                 pose = state["body_pose"][body] if body >= 0 else matrix_pose7(outlet.T_base)
                 frames.append(_transform(f"{self._frame_prefix}world", outlet.base_frame, pose, stamp))
@@ -236,7 +236,10 @@ class ArmsNode:
     def _listener(self, outlet: ArmOutlet, topic: str, take: Callable[[Any], ArmCommand]) -> Callable[[Any], None]:
         def listen(message: Any) -> None:
             try:
-                self.push(take(message))
+                command = take(message)
+                if isinstance(command, SetBaseFrame) and command.reference == outlet.frame:
+                    raise ValueError(f"'{outlet.frame}' is the frame of the tip; name the one in which the base stands")
+                self.push(command)
             except (ValueError, CodecError) as error:
                 self.rejected += 1
                 outlet.events.publish("warning", f"{topic}: command rejected: {error}")

@@ -37,7 +37,8 @@ class ArmOutlet:
 
     def __init__(self, index: int, description: ArmDescription, root: str, scene: Scene) -> None:
         self.index, self.description, self.root = index, description, root
-        self.base_frame = f"{scene.world.frame_prefix}{description.name}_base"
+        self.frame = f"{scene.world.frame_prefix}{description.name}"
+        self.base_frame = f"{self.frame}_base"
         self.T_base = base_pose(scene, description)
         self._kinematics = kinematics = kinematics_of(scene, description)
         self._T_reference_base = np.eye(4)
