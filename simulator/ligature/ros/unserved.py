@@ -74,7 +74,10 @@ LACKING: Sequence[tuple[str, str]] = (
     (r"console/teleop/\w*psm", "run 'ligature teleop', which serves it"),
     (r"CRTK/", "run with '--src-crtk', which provides these names"),
     (r"ambf/env/(?:Needle|CameraFrame)/", "run with '--names src', which provides this name"),
-    (rf"ambf/env/\S+/(?:{'|'.join(PICTURES)})\Z", "pictures need a run without '--no-cameras' that shows this camera"),
+    (
+        rf"ambf/env/\S+/(?:{'|'.join(PICTURES)})\Z",
+        "pictures need a run without '--no-cameras' that shows this camera, and begin with 'render ready'",
+    ),
 )
 """Patterns of names that a run does not have, and why or how it would."""
 
