@@ -83,18 +83,18 @@ def test_an_alarm_of_a_file_whose_name_is_no_utf_8_ends_no_run(run: Run, capsys:
 def test_what_fails_again_and_again_hides_nothing_and_fills_no_terminal(
     run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As a client does that asks at 120 Hz for a body that is not there."""
-    told, noted = list[str](), set[bytes]()
+    """As a client does that asks at 120 Hz for a missing body."""
+    lines, noted = list[str](), set[bytes]()
     for second in range(6):
         run.simulation.problems.clear()
         run.simulation.problems.extend([Diagnostic(Severity.WARNING, "no such body")] * 120)
         run.simulation.problems.extend([Diagnostic(Severity.ERROR, "diverged")] * (second == 3))
-        run.loop._tell(100.0 + second)
-        told += [line for line in capsys.readouterr().out.splitlines() if line.startswith("@warning")]
+        run.loop._report(100.0 + second)
+        lines += [line for line in capsys.readouterr().out.splitlines() if line.startswith("@warning")]
         noted |= set(run.block.figures["findings"]["text"].reshape(-1).tolist())
-    assert [line for line in told if "diverged" in line] == ["@warning error: diverged"]
-    assert told.count("@warning warning: no such body (120 times)") == 3, "every two seconds"
-    assert len(told) == 4
+    assert [line for line in lines if "diverged" in line] == ["@warning error: diverged"]
+    assert lines.count("@warning warning: no such body (120 times)") == 3, "every two seconds"
+    assert len(lines) == 4
     assert {b"error: diverged", b"warning: no such body"} <= noted
 
 

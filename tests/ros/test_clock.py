@@ -47,7 +47,7 @@ def test_states_are_stamped_by_the_wall_clock(simulator: Program, node: Any, clo
             assert abs(topic.messages[-1].header.stamp.to_sec() - time.time()) < 5.0
 
 
-def test_every_rejection_is_told_though_no_clock_runs(simulator: Program, node: Any) -> None:
+def test_every_rejection_is_reported_though_no_clock_runs(simulator: Program, node: Any) -> None:
     """Their pauses are counted on a clock that runs."""
     from sensor_msgs.msg import JointState
     from std_msgs.msg import String
@@ -55,13 +55,13 @@ def test_every_rejection_is_told_though_no_clock_runs(simulator: Program, node: 
     move = node.Publisher("/PSM1/move_jp", JointState, queue_size=10)
     warnings = Listener(node, "/PSM1/warning", String)
     until(lambda: move.get_num_connections(), "the run listens", 20.0)
-    for told in (1, 2):
+    for count in (1, 2):
         move.publish(JointState(position=[0.0] * 6))
-        until(lambda told=told: len(warnings.messages) == told, "a warning that the arm is not ready", 20.0)
+        until(lambda count=count: len(warnings.messages) == count, "a warning that the arm is not ready", 20.0)
         time.sleep(2.1)
     assert {m.data for m in warnings.messages} == {"move_jp: PSM1 is DISABLED; arm not ready: send 'enable'"}
     assert sum("/PSM1: move_jp: PSM1 is DISABLED" in line for line in simulator.lines) == 2
 
 
-def test_the_run_tells_what_waits_for_a_clock(simulator: Program) -> None:
+def test_the_run_reports_what_waits_for_a_clock(simulator: Program) -> None:
     simulator.wait_for("/use_sim_time is true: stamps of this run are of the wall clock", 30.0)

@@ -106,7 +106,7 @@ class Loop:
         self._updates = 0
         self._mark_updates = 0
         self._warned = 0
-        self._told: dict[str, float] = {}
+        self._printed: dict[str, float] = {}
 
     def end(self) -> None:
         """The run is over."""
@@ -191,17 +191,17 @@ class Loop:
             if problem.code in ALARMS:
                 figures["alarms"] += 1
                 figures["alarm"] = printable(problem).encode("utf-8")[:ALARM_BYTES]
-        self._tell(now)
+        self._report(now)
         self._simulation.problems.clear()
 
-    def _tell(self, now: float) -> None:
+    def _report(self, now: float) -> None:
         """Note and print what went wrong, the worst first: a client may repeat what fails a thousand times a second."""
         worst = sorted(self._simulation.problems, key=lambda problem: -problem.severity)
         severities = {str(problem): problem.severity for problem in worst}
         times = Counter(map(str, worst))
         for text in reversed(list(severities)[:MOST_NOTED]):
             self._block.note(severities[text], text)
-        self._told = {text: at for text, at in self._told.items() if now - at < REPEAT}
-        for text in [text for text in severities if text not in self._told][:MOST_PRINTED]:
-            self._told[text] = now
+        self._printed = {text: at for text, at in self._printed.items() if now - at < REPEAT}
+        for text in [text for text in severities if text not in self._printed][:MOST_PRINTED]:
+            self._printed[text] = now
             report("warning", text if times[text] == 1 else f"{text} ({times[text]} times)")

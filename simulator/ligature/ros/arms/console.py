@@ -127,10 +127,10 @@ def _relay(publishers: Sequence[Any], content: Callable[[Any], Any]) -> Callable
     """What publishes the ``content`` of each message that it is given, unless it is None."""
 
     def relay(message: Any) -> None:
-        told = content(message)
-        if told is not None:
+        event = content(message)
+        if event is not None:
             for publisher in publishers:
-                publisher.publish(told)
+                publisher.publish(event)
 
     return relay
 
