@@ -170,6 +170,42 @@ def test_a_turned_joint_is_open_by_its_own_motion_and_follows() -> None:
     assert not follows(joint, JointPlace(joint_pose(joint), opened), kind="fixed")
 
 
+@settings(deadline=None)
+@given(
+    st.tuples(VECTORS, VECTORS, AXES, AXES, ANGLES, ANGLES),
+    st.sampled_from(["revolute", "prismatic", "torsion spring", "linear spring"]),
+    st.tuples(POSES, POSES),
+    POSES,
+    POSES,
+    ANGLES,
+    st.sampled_from(["child", "joint", "both"]),
+)
+def test_a_joint_away_from_zero_keeps_its_position_when_it_or_its_child_moves(
+    keys: tuple, kind: str, inertial: tuple, child: tuple, moved: tuple, position: float, what: str
+) -> None:
+    joint, prismatic = JointKeys(*keys), kind == "prismatic"
+    frames = tuple(pose_matrix(*pose) for pose in inertial)
+
+    def held(stated: JointKeys) -> np.ndarray:
+        """The child at the joint's position, from the closed form alone."""
+        T = joint_pose(stated, *frames, prismatic=prismatic)
+        if kind in ("prismatic", "linear spring"):
+            motion = frame(np.eye(3), (position, 0, 0) if prismatic else (0, 0, position))
+        else:
+            motion = frame(axis_rotation((0, 0, 1), position), (0, 0, 0))
+        return T @ motion @ inverse(T) @ child_pose(stated, *frames, prismatic=prismatic)
+
+    T_joint, T_child = joint_pose(joint, *frames, prismatic=prismatic), held(joint)
+    before = JointPlace(T_joint, T_child)
+    now = JointPlace(
+        T_joint if what == "child" else pose_matrix(*moved) @ T_joint,
+        T_child if what == "joint" else pose_matrix(*child) @ T_child,
+    )
+    found = moved_joint(joint, before, now, frames, kind)
+    assert same_place(joint_pose(found, *frames, prismatic=prismatic), now.T_parent_joint, 1e-4)
+    assert same_place(held(found), now.T_parent_child, 2e-4)
+
+
 def test_a_new_pose_has_short_digits() -> None:
     T = single(pose_matrix((0.1, -0.2, 0.3), (0.1, 0.2, 0.3)))
     assert new_pose(T) == ((0.1, -0.2, 0.3), (0.1, 0.2, 0.3))

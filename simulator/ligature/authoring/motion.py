@@ -12,7 +12,7 @@ from math import pi
 
 import numpy as np
 
-from ligature.adf.frames import Array, frame, inverse, matrix_rpy, rpy_matrix
+from ligature.adf.frames import Array, axis_rotation, frame, inverse, matrix_rpy, rpy_matrix
 from ligature.authoring.placement import (
     JointKeys,
     Pose,
@@ -41,11 +41,15 @@ MOVED = 2e-6
 LOOSE, LOOSE_TURN, EXACT = 0.1, 0.05, 1e-5
 """What poses of rounded files are off their joints: a share of the pivots' lengths, an angle, and metres at least."""
 
+AT_ZERO = 1e-4
+"""Radians below which a joint is at its position zero: what files round of poses and offsets."""
+
 DECIMALS = 17
 _ROUND = ("revolute", "torsion spring")
 _TURNING = ("p2p", "cone twist")
 _SLIDES = {"prismatic": 0, "linear spring": 2}
 """Axis of frame A along which a joint of a type slides."""
+_LOOSE_IN_ALL = ("six dof", "six dof spring")
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,10 +158,8 @@ def follows(
 
     Files made elsewhere state joints whose bodies all stand in one place; such joints do not follow from the poses.
     """
-    prismatic = kind == "prismatic"
     scaled = _scaled(keys, scales)
-    T_joint, T_child = _poses(scaled, inertial, prismatic)
-    motion = inverse(T_joint) @ place.T_parent_child @ inverse(T_child) @ T_joint
+    motion = _motion(*_poses(scaled, inertial, kind == "prismatic"), place)
     shift = motion[:3, 3].copy()
     if kind in _SLIDES:
         shift[_SLIDES[kind]] = 0.0
@@ -182,23 +184,49 @@ def moved_joint(
 ) -> JointKeys:
     """The keys of a file's joint after it, its parent or its child moved; what did not change is the file's own.
 
+    A joint that follows keeps its position: it holds the child where it stands now at the same angle or displacement.
     A joint that does not follow from the poses of its bodies stays as it is when these move, and keeps its own pose
     of the child when it is moved itself.
     """
     prismatic, noise = kind == "prismatic", SINGLE * 2.0 * reach
     joint_stays = same_place(before.T_parent_joint, now.T_parent_joint)
     child_stays = same_place(before.T_parent_child, now.T_parent_child)
-    child_stays = child_stays or not follows(keys, before, inertial, kind, scales)
+    goes_along = follows(keys, before, inertial, kind, scales)
+    child_stays = child_stays or not goes_along
     if joint_stays and child_stays:
         return keys
     T_joint_0, T_child_0 = _poses(_scaled(keys, scales), inertial, prismatic)
     T_joint = T_joint_0 if joint_stays else change(before.T_parent_joint, now.T_parent_joint, noise) @ T_joint_0
-    T_child = T_child_0 if child_stays else change(before.T_parent_child, now.T_parent_child, noise) @ T_child_0
+    own = _own_motion(_motion(T_joint_0, T_child_0, before), kind) if goes_along else None
+    T_child = T_child_0 if own is None else T_joint_0 @ own @ inverse(T_joint_0) @ T_child_0
+    if not child_stays:
+        T_child = change(before.T_parent_child, now.T_parent_child, noise) @ T_child
+    if own is not None:  # back to the position zero that keys are stated for, about the joint where it is now
+        T_child = T_joint @ inverse(own) @ inverse(T_joint) @ T_child
     moved = _moved_keys(keys, (T_joint_0, T_child_0), (T_joint, T_child), inertial, prismatic, scales, noise)
     again = zip(_poses(_scaled(moved, scales), inertial, prismatic), (T_joint, T_child), strict=True)
     if all(same_place(found, wanted, 4.0 * MOVED) for found, wanted in again):
         return moved
     return _new_joint(joint_keys(T_joint, T_child, *inertial, prismatic, scales), noise)
+
+
+def _motion(T_joint: Array, T_child: Array, place: JointPlace) -> Array:
+    """How far the child of a joint stands from the pose that its keys state, in the joint's frame A."""
+    return inverse(T_joint) @ place.T_parent_child @ inverse(T_child) @ T_joint
+
+
+def _own_motion(motion: Array, kind: str) -> Array | None:
+    """The part of a motion in frame A that a joint of this kind moves by itself; None where it is at zero."""
+    turn, shift = np.eye(3), np.zeros(3)
+    if kind in _SLIDES:
+        shift[_SLIDES[kind]] = motion[_SLIDES[kind], 3]
+    elif kind in _ROUND:
+        turn = axis_rotation((0, 0, 1), float(np.arctan2(motion[1, 0] - motion[0, 1], motion[0, 0] + motion[1, 1])))
+    elif kind in (*_TURNING, *_LOOSE_IN_ALL):
+        turn = motion[:3, :3]
+        shift = motion[:3, 3] if kind in _LOOSE_IN_ALL else shift
+    own = frame(turn, shift)
+    return None if np.abs(shift).max() <= EXACT and _angle(np.eye(4), own) <= AT_ZERO else own
 
 
 def new_joint(
