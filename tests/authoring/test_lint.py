@@ -36,11 +36,12 @@ SOUND: dict[str, Any] = {
         "child pivot": ZERO, "parent axis": UP, "child axis": UP, "joint limits": {"low": -1.0, "high": 1.0},
     },
 }  # fmt: skip
+PATHS = {"high resolution path": "high", "low resolution path": "low"}
 SIX = {"linear": {"low": ZERO, "high": ZERO}, "angular": {"low": ZERO, "high": ZERO}}
 
 
 def write_mesh(folder: Path, name: str, shape: Shape, material: str = "") -> None:
-    folder.mkdir(exist_ok=True)
+    folder.mkdir(exist_ok=True, parents=True)
     vertices, faces = shape_mesh(shape)
     triangles = np.array([(f[0], f[i], f[i + 1]) for f in faces for i in range(1, len(f) - 1)], dtype=np.int32)
     obj, mtl = obj_texts([Surface(Paint("m"), vertices, triangles)], name.replace(".obj", ".mtl"), name)
@@ -122,6 +123,29 @@ def test_a_seeded_fault_is_found_by_its_rule(model, name: str, changes: dict[str
     found = [finding for finding in model(changes) if finding.rule == name]
     assert found, [str(f) for f in model(changes)]
     assert found[0].message and (found[0].hint or name.startswith("reader"))
+
+
+@pytest.mark.parametrize("scale", [0.01, 50.0])
+def test_a_mesh_counts_as_large_as_its_scale_makes_it(model, scale: float) -> None:
+    for folder, name, size in (("high", "a.obj", 0.1), ("low", "a_hull.obj", 0.09)):
+        write_mesh(model.folder / folder, name, Shape("BOX", size=(size / scale,) * 3))
+    moments = dict.fromkeys(("ix", "iy", "iz"), 1.0 / 600.0)
+    pivot = {**UP, "z": 0.5 / scale}  # scaled too
+    assert model({"BODY a/scale": scale, "BODY a/inertia": moments, "JOINT j/parent pivot": pivot}) == []
+    assert {f.rule for f in model({"BODY a/inertia": moments})} >= {"inertia-unlike-geometry"}
+
+
+def test_folders_are_those_that_the_simulator_opens(model) -> None:
+    absolute = {key: str(model.folder / name) for key, name in PATHS.items()}
+    assert model(absolute) == []
+    assert (
+        model({**dict.fromkeys(PATHS, "elsewhere/"), **{f"BODY a/{key}": path for key, path in absolute.items()}}) == []
+    )
+    write_mesh(model.folder / "low" / "own", "a_hull.obj", Shape("BOX", size=(0.1, 0.1, 0.1)))
+    write_mesh(model.folder / "high" / "own", "a.obj", Shape("SPHERE", radius=0.05))
+    for folder, name in (("high", "a.obj"), ("low", "a_hull.obj")):
+        (model.folder / folder / name).unlink()
+    assert "mesh-missing" not in {f.rule for f in model({"BODY a/high resolution path": "own"})}
 
 
 def test_faults_of_meshes_are_found(model) -> None:

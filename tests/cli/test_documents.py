@@ -64,6 +64,26 @@ def test_inertia_of_a_box_is_its_closed_form(tmp_path: Path) -> None:
     assert "BODY a: mass 6 kg, volume 6 m³, inertia {ix: 6.5, iy: 5, iz: 2.5}" in run("inertia", tmp_path / "m.yaml")
 
 
+@pytest.mark.parametrize("scale", [1, 0.001, 2.5, -2])
+@pytest.mark.parametrize("key", ["mesh", "collision mesh"])
+@pytest.mark.parametrize("folder", ["", "far"], ids=["beside", "absolute"])
+def test_inertia_of_a_mesh_is_that_of_its_scaled_size(tmp_path: Path, scale: float, key: str, folder: str) -> None:
+    corners = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 2) for z in (0, 3))
+    sides = "1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4"
+    (tmp_path / folder).mkdir(exist_ok=True)
+    (tmp_path / folder / "box.obj").write_text(f"{corners}f {sides}\n")
+    path = tmp_path / folder if folder else "."
+    (tmp_path / "m.yaml").write_text(
+        f"high resolution path: {path}\nlow resolution path: {path}\nbodies: [P]\n"
+        f"P: {{name: p, mass: 6, {key}: box.obj, scale: {scale}}}\n"
+    )
+    text = run("inertia", tmp_path / "m.yaml")
+    moments = [float(text.split(f"{name}: ")[1].split(",")[0].rstrip("}")) for name in ("ix", "iy", "iz")]
+    assert moments == pytest.approx([v * scale**2 for v in (6.5, 5.0, 2.5)], rel=1e-4)
+    assert float(text.split("volume ")[1].split()[0]) == pytest.approx(6.0 * abs(scale) ** 3, rel=1e-4)
+    assert float(text.split("position {x: ")[1].split(",")[0]) == pytest.approx(0.5 * scale, rel=1e-4)
+
+
 @pytest.mark.parametrize(
     ("shapes", "volume"),
     [

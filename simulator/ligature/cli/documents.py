@@ -141,15 +141,15 @@ def inertia(file: Path, density: float, mass: float | None, console: Console) ->
 def _solid(subject: Subject, body: Element) -> MassProperties:
     """Mass properties at unit density, of the collision shapes, else of the mesh; tissue fills what is drawn first."""
     soft = body.has("ligature tissue")
-    mesh = subject.mesh(body, "mesh")
+    surface = subject.surface(body)
     placed = (subject.looks(body) if soft else []) or subject.shapes(body)
     shapes = [(shape, T) for shape, T in placed if shape.kind != "PLANE"]
-    if shapes and not (soft and mesh is not None):
+    if shapes and not (soft and subject.mesh(body, "mesh") is not None):
         return shapes_properties(shapes)
-    if mesh is None:
+    if surface is None:
         need = "a 'shape'" if soft else "a 'collision shape'"
         raise ValueError(f"there is neither a mesh nor a shape to measure; add {need} or a 'mesh'")
-    return mass_properties(*joined(mesh.parts))
+    return mass_properties(*surface)
 
 
 def _print_solid(name: str, solid: MassProperties, console: Console) -> None:

@@ -14,7 +14,7 @@ from ligature.authoring.lint.subject import Finding, Subject, rule
 from ligature.authoring.placement import AXIS_TURNS, matrix_of
 from ligature.authoring.shapes import ROUND, Shape, shape_mesh, shapes_properties
 from ligature.mesh.inertia import mass_properties
-from ligature.mesh.surface import extent_rank, joined
+from ligature.mesh.surface import extent_rank
 
 INERTIA_RATIO = 10.0
 MARGIN_RATIO = 4.0
@@ -77,10 +77,10 @@ def _geometric_moments(subject: Subject, body: Element) -> Array | None:
         if shapes:
             solid = shapes_properties(shapes)
         else:
-            mesh = subject.mesh(body, "mesh")
-            if mesh is None:
+            surface = subject.surface(body)
+            if surface is None:
                 return None
-            solid = mass_properties(*joined(mesh.parts))
+            solid = mass_properties(*surface)
         return np.asarray(solid.with_mass(body.number("mass")).principal()[0])
     except ValueError:
         return None

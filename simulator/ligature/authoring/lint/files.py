@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ligature.adf import Element, ResolutionError, Severity
-from ligature.authoring.lint.subject import Finding, Subject, rule
+from ligature.authoring.lint.subject import HIGH, Finding, Subject, rule
 from ligature.paths import real_path
 
 LARGEST, SMALLEST = 100.0, 1e-3
@@ -43,7 +43,7 @@ def mesh_missing(subject: Subject) -> Iterator[Finding]:
         except ResolutionError as error:
             yield Finding("path-outside", Severity.ERROR, element.key, str(error), "keep meshes with the scene")
             continue
-        fallback = key == "collision mesh" and (subject.folder(element, "high resolution path") / path.name).is_file()
+        fallback = key == "collision mesh" and (subject.folder(element, HIGH) / path.name).is_file()
         if not real.is_file():
             severity = Severity.WARNING if fallback else Severity.ERROR
             message = f"its {key} '{path.name}' is not in {path.parent}"
@@ -135,11 +135,10 @@ def unit_smell(subject: Subject) -> Iterator[Finding]:
     places = [b.pose("location")[0] for b in subject.bodies.values()]
     corners = [np.asarray(p) for p in places]
     for body in subject.bodies.values():
-        mesh = subject.mesh(body, "mesh")
-        if mesh is not None and len(mesh.vertices):
+        surface = subject.surface(body)
+        if surface is not None and len(surface[0]):
             corners += [
-                np.asarray(body.pose("location")[0]) + extreme
-                for extreme in (mesh.vertices.min(0), mesh.vertices.max(0))
+                np.asarray(body.pose("location")[0]) + extreme for extreme in (surface[0].min(0), surface[0].max(0))
             ]
     if len(corners) < 2:
         return

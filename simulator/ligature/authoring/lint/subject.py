@@ -17,6 +17,9 @@ from ligature.authoring.placement import matrix_of
 from ligature.authoring.shapes import Shape
 from ligature.mesh.load import load_mesh
 from ligature.mesh.mesh import Mesh
+from ligature.mesh.surface import Faces, joined
+
+HIGH, LOW = "high resolution path", "low resolution path"
 
 
 @dataclass(frozen=True)
@@ -92,20 +95,29 @@ class Subject:
         return None if found is None else self.bodies[keys[found]]
 
     def folder(self, element: Element, key: str) -> Path:
-        """The folder that a path key of the file and of the object name."""
-        return self.document.path.parent / f"{self.document.top.text(key)}/{element.text(key)}".lstrip("/")
+        """The folder that a path key of the file and of the object name; an absolute one counts alone (as in AMBF)."""
+        own = element.text(key) or (element.text(HIGH) if key == LOW else "")
+        return self.document.path.parent / self.document.top.text(key) / own
 
     def mesh_path(self, element: Element, key: str) -> Path | None:
         """Where the mesh of ``mesh`` or ``collision mesh`` lies; None without one."""
         name = element.value(key)
         if not name:
             return None
-        return self.folder(element, "high resolution path" if key == "mesh" else "low resolution path") / str(name)
+        return self.folder(element, HIGH if key == "mesh" else LOW) / str(name)
 
     def mesh(self, element: Element, key: str) -> Mesh | None:
         """The mesh, when it can be read."""
         path = self.mesh_path(element, key)
         return None if path is None else self._load(path)
+
+    def surface(self, element: Element) -> tuple[Array, Faces] | None:
+        """The whole mesh as the simulator scales it, welded, in metres: the visual one, else that of collisions."""
+        mesh = self.mesh(element, "mesh") or self.mesh(element, "collision mesh")
+        if mesh is None:
+            return None
+        vertices, faces = joined(mesh.parts)
+        return vertices * element.number("scale"), faces
 
     def _load(self, path: Path) -> Mesh | None:
         if path not in self._meshes:
