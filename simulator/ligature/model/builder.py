@@ -23,7 +23,7 @@ from ligature.model.joints import fixed_joint, joint_of
 from ligature.model.lookup import candidates
 from ligature.model.lost import LostBodies
 from ligature.model.mounted import actuator_of
-from ligature.model.naming import Names, free_suffix, merged
+from ligature.model.naming import Names, free_suffix, merged, topic_name
 from ligature.model.parenting import Arrivals
 from ligature.model.scene import (
     Actuator,
@@ -83,7 +83,8 @@ class SceneBuilder:
         self.silent_files: list[list[int]] = []
         self.linked: list[tuple[int, int]] = []
         self.no_rod: set[int] = set()
-        self._names = {kind: Names() for kind in (*KINDS, "suture")}
+        topics = {files.world.topic}
+        self._names = {kind: Names(topics=None if kind == "joint" else topics) for kind in KINDS} | {"suture": Names()}
         self._scales: list[float] = []
         self._in_file: dict[int, str] = {}
         """Identifiers of bodies within their file: without the suffix that they have where it is loaded twice."""
@@ -152,7 +153,15 @@ class SceneBuilder:
         return lists[kind]
 
     def _identity(self, kind: str, element: Element, model: Model) -> Identity:
-        return self._names[kind].identity(element, model.namespace, model.index)
+        identity = self._names[kind].identity(element, model.namespace, model.index)
+        name = element.text("name").replace(" ", "")
+        repeated = identity.identifier != identity.namespace + element.key  # a file that is loaded twice needs no word
+        if name and identity.name != name and not repeated:
+            shared = topic_name(identity.namespace, name)
+            message = f"{element.kind} '{element.key}' shares the topics '{shared}'; it gets '{identity.topic}'"
+            hint = "give each object a name of its own; blanks in names do not count"
+            self.report(Diagnostic(Severity.WARNING, message, element.mark_of("name"), hint, "name"))
+        return identity
 
     def _remap(self, kind: str, element: Element, model: Model) -> str:
         """The suffix of an object of whose name an earlier file has one, as where a file is loaded twice."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import reprlib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Generic, Protocol, TypeVar
 
@@ -40,13 +41,20 @@ class Running(Protocol):
 
 
 class Handles(Mapping[str, Handle], Generic[Handle]):
-    """Objects of one kind by topic name, identifier, name, or any part of these that only one of them has."""
+    """Objects of one kind by topic name, identifier, name, or any part of these that only one of them has.
+
+    Its keys are the topic names, and identifiers of objects that share one, such as joints of one name.
+    """
 
     def __init__(
         self, kind: str, items: Sequence[Body] | Sequence[Joint] | Sequence[Camera], handles: Sequence[Handle]
     ) -> None:
         self._kind = kind
-        self._names = ([i.identity.topic for i in items], [i.identity.identifier for i in items])
+        times = Counter(item.identity.topic for item in items)
+        self._names = (
+            [i.identity.topic if times[i.identity.topic] == 1 else i.identity.identifier for i in items],
+            [i.identity.identifier for i in items],
+        )
         self._bare_names = [i.identity.name for i in items]
         self._handles = list(handles)
 

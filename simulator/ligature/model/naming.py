@@ -31,9 +31,13 @@ def free_suffix(base: str, taken: Container[str]) -> str:
 
 @dataclass
 class Names:
-    """Hands out identities of one kind of object; repeated ``identifiers`` get the suffixes 1, 2 and so on."""
+    """Hands out identities of one kind of object; repeated ``identifiers`` get the suffixes 1, 2 and so on.
+
+    So do names whose topic is one of ``topics`` already, which all kinds that have topics share.
+    """
 
     identifiers: list[str] = field(default_factory=list)
+    topics: set[str] | None = None
 
     def identity(self, element: Element, namespace: str, model: int, passive: bool | None = None) -> Identity:
         """The identity of ``element`` in a file with ``namespace``; it is registered as taken."""
@@ -41,15 +45,23 @@ class Names:
         base = space + element.key
         suffix = free_suffix(base, set(self.identifiers))
         self.identifiers.append(base + suffix)
+        passive = element.flag("passive") if passive is None else passive
         name = element.text("name").replace(" ", "")
+        if name:
+            name += suffix
+            if self.topics is not None and not passive:
+                name += free_suffix(topic_name(space, name), self.topics)
+                self.topics.add(topic_name(space, name))
+        else:
+            name = suffix
         parent = element.text("parent") if element.kind != "suture" else ""
         return Identity(
             key=element.key,
-            name=name + suffix,
+            name=name,
             identifier=base + suffix,
-            topic=topic_name(space, name + suffix),
+            topic=topic_name(space, name),
             model=model,
-            passive=element.flag("passive") if passive is None else passive,
+            passive=passive,
             publish_low=element.integer("publish frequency.low"),
             publish_high=element.integer("publish frequency.high"),
             parent_text=parent,
