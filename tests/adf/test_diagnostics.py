@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ligature.adf.diagnostics import length
+from ligature.adf import Diagnostic, Severity
+from ligature.adf.diagnostics import length, one_line
 
 
 @given(st.floats(1e-6, 9999.0), st.sampled_from((2, 3)))
@@ -21,3 +22,11 @@ def test_a_length_keeps_its_digits(metres: float, digits: int) -> None:
 )
 def test_lengths_from_a_metre_on_are_in_metres(metres: float, digits: int, text: str) -> None:
     assert length(metres, digits) == text
+
+
+@given(st.text(max_size=30))
+def test_a_finding_stays_one_line_of_what_a_terminal_shows(name: str) -> None:
+    text = str(Diagnostic(Severity.WARNING, f"body '{name}' is odd"))
+    assert text.isprintable() and text.splitlines() == [text]
+    assert not name.isprintable() or name in text
+    assert one_line("tab\t\nred \x1b[31m\x85é体") == r"tab\t\nred \x1b[31m\x85é体"

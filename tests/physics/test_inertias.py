@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from ligature import Simulation
 from ligature.cli.check import findings
 from ligature.model.frames import pose7_matrix
-from ligature.physics.inertias import LEAST_INERTIA, inertia_of
+from ligature.physics import inertias
+from ligature.physics.inertias import LEAST_INERTIA, LEAST_MASS, inertia_of
 
 Make = Callable[[str], Simulation]
 Moments = tuple[float, float, float]
@@ -153,3 +154,14 @@ def test_what_hangs_on_a_body_that_no_real_one_is_like_turns_no_faster_than_it_i
         simulation.step(25)
         assert np.linalg.norm(simulation.state["body_twist"][0, :, :3], axis=1).max() < 5.0
     simulation.close()
+
+
+@pytest.mark.parametrize("mass", [5e-324, 1e-300, 1e-17])
+def test_a_mass_too_small_to_move_is_reported(mass: float, simulate: Make) -> None:
+    text = "bodies: [B]\nB: {{name: B, mass: {}, inertia: {{ix: 1, iy: 1, iz: 1}}}}\n"
+    (found,) = inertias.findings(simulate(text.format(mass)).scene)
+    assert "too little to move; give at least 1e-15 kg" in str(found)
+    lightest = simulate(text.format(LEAST_MASS))
+    assert not inertias.findings(lightest.scene)
+    lightest.step(100)
+    assert lightest.bodies["B"].pose[2] == pytest.approx(-0.5 * 9.8 * 0.1**2, rel=0.02)

@@ -22,6 +22,11 @@ def span(low: Iterable[float], high: Iterable[float]) -> str:
     return f"from ({first}) to ({last}) {'m' if far else 'mm'}"
 
 
+def one_line(text: str) -> str:
+    """``text`` of a file with its line breaks and control characters as escapes, so that a finding stays one line."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 class Severity(enum.IntEnum):
     """How much a finding matters; only errors make `ligature check` fail."""
 
@@ -56,7 +61,7 @@ class Diagnostic:
     def __str__(self) -> str:
         place = f"{self.mark}: " if self.mark else ""
         hint = f"; {self.hint}" if self.hint else ""
-        return f"{place}{self.severity.name.lower()}: {self.message}{hint}"
+        return one_line(f"{place}{self.severity.name.lower()}: {self.message}{hint}")
 
 
 def any_error(found: Iterable[Diagnostic]) -> bool:

@@ -14,7 +14,7 @@ from ligature.kernels import compiled
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Body, Joint, JointType, Scene, SensorType
 from ligature.model.state import StateRecord
-from ligature.physics.inertias import inertia_of
+from ligature.physics.inertias import LEAST_MASS, inertia_of
 from ligature.physics.overlaps import DEEP
 from ligature.physics.world import World
 
@@ -116,7 +116,7 @@ class Guard:
         self._twist = state["body_twist"][0]
         self._mass = np.array([body.mass for body in scene.bodies])
         inertia = np.array([inertia_of(body).max() for body in scene.bodies])
-        self._gyration = np.divide(inertia, self._mass, out=np.zeros(len(inertia)), where=self._mass > 0.0)
+        self._gyration = np.divide(inertia, self._mass, out=np.zeros(len(inertia)), where=self._mass >= LEAST_MASS)
         self._rigid = np.array([b.index not in scene.rod_bodies and not b.static for b in scene.bodies], dtype=bool)
         self._before = np.zeros(len(scene.bodies))
         gravity = np.array([body.gravity for body in scene.bodies]).reshape(-1, 3)

@@ -17,6 +17,9 @@ Bullet (`btMultiBody::solveImatrix` and its joints) lets nothing turn whose mome
 2.2e-16: torques on it are lost. Measured by `tests/physics/test_inertias.py`.
 """
 
+LEAST_MASS = 1e-15
+"""Smallest mass of a moving body, in kg. Bullet lets nothing fall below the rounding of 1, 2.2e-16, either."""
+
 MOST_RATIO = 1e7
 """Largest principal moment of a moving body, over its smallest: of a wire of 1 m and 0.6 mm that is 2e6.
 
@@ -49,13 +52,17 @@ def inertia_of(body: Body) -> Array:
 
 
 def findings(scene: Scene) -> list[Diagnostic]:
-    """Moving bodies outside rods whose moments are replaced.
+    """Moving bodies outside rods whose mass is too small to move, or whose moments are replaced.
 
     Moments that are too small or too different are a warning. A body without any, which has neither shape nor
     ``inertia``, is a detail: the simulator has to choose some.
     """
     found = []
     for body in scene.bodies:
+        if 0.0 < body.mass < LEAST_MASS:
+            message = f"body '{body.identity.key}' has a mass of {body.mass:g} kg, too little to move"
+            hint = f"give at least {LEAST_MASS:g} kg, or 0 for a body that stands still"
+            found.append(Diagnostic(Severity.WARNING, message, body.identity.mark, hint, "inertia"))
         used = inertia_of(body)
         if body.index in scene.rod_bodies or body.mass <= 0.0 or (used == body.inertia).all():
             continue
