@@ -14,7 +14,7 @@ from adf_studio.check_operators import check_file, mend
 from adf_studio.ligature.adf.nodes import parse, plain
 from adf_studio.ligature.adf.reader import read_text
 from adf_studio.ligature.adf.schema import BY_PATH, LISTS
-from adf_studio.ligature.authoring.placement import JointKeys, child_pose, matrix_of
+from adf_studio.ligature.authoring.placement import JointKeys, child_pose, matrix_of, moved_child_pose, pose_of
 from adf_studio.placing import place
 from adf_studio.poses import rest_pose
 from adf_studio.read_file import import_file
@@ -399,6 +399,46 @@ JOINT j:
     keys = after.elements("joints")[0]
     assert keys.vector("parent pivot") == (0.5, 0.0, 0.31) and keys.vector("parent axis") == (0.0, 0.0, -2.0)
     assert keys.number("offset") == 0.7
+
+
+BENT = """bodies: [BODY a, BODY b]
+joints: [JOINT j]
+BODY a: {{name: a, mass: 0.0, location: {a}}}
+BODY b: {{name: b, mass: 1.0, scale: 2.0, location: {b}}}
+JOINT j: {{name: j, type: {kind}, parent: BODY a, child: BODY b, parent pivot: {{x: 0.1, y: 0.2, z: 0.0}},
+  child pivot: {{x: 0.0, y: -0.1, z: 0.05}}, parent axis: {{x: 0, y: 1, z: 0}}, child axis: {{x: 0.6, y: 0, z: -0.8}},
+  offset: 0.7, joint limits: {{low: -2, high: 2}}}}
+"""
+BENT_KEYS = JointKeys((0.1, 0.2, 0.0), (0.0, -0.2, 0.1), (0.0, 1.0, 0.0), (0.6, 0.0, -0.8), 0.7)
+
+
+def adf_pose(T):
+    (x, y, z), (r, p, yaw) = pose_of(T)
+    return f"{{position: {{x: {x}, y: {y}, z: {z}}}, orientation: {{r: {r}, p: {p}, y: {yaw}}}}}"
+
+
+@pytest.mark.parametrize("moved", ["BODY a", "BODY b", "JOINT j"])
+@pytest.mark.parametrize("turns", [False, True], ids=["shifted", "turned"])
+@pytest.mark.parametrize(("kind", "position"), [("revolute", 1.1), ("torsion spring", -0.6), ("prismatic", 0.3)])
+def test_a_bent_joint_keeps_its_position_when_one_of_its_ends_moves(tmp_path, kind, position, turns, moved):
+    prismatic = kind == "prismatic"
+    T_a = matrix_of(((0.3, -0.2, 0.5), (0.4, -0.3, 1.2)))
+    T_b = T_a @ moved_child_pose(BENT_KEYS, position, prismatic=prismatic)
+    file = tmp_path / "m.yaml"
+    file.write_text(BENT.format(a=adf_pose(T_a), b=adf_pose(T_b), kind=kind))
+    done = import_file(file, bpy.context.scene)
+    obj = next(o for o in members(done.collection) if o.adf.key == moved)
+    obj.location.x += 0.001
+    obj.rotation_euler.z += 0.2 * turns
+    after = read_text(prepared(done.collection, file).text, file, "model")
+    a, b = (matrix_of(body.pose("location")) for body in after.elements("bodies"))
+    (joint,) = after.elements("joints")
+    keys = JointKeys(
+        joint.vector("parent pivot"), tuple(2.0 * v for v in joint.vector("child pivot")),
+        joint.vector("parent axis"), joint.vector("child axis"), joint.number("offset"), joint.number("joint offset"),
+    )  # fmt: skip
+    np.testing.assert_allclose(a @ moved_child_pose(keys, position, prismatic=prismatic), b, atol=5e-6)
+    assert moved != "BODY b" or abs(b[0, 3] - T_b[0, 3] - 0.001) < 1e-6
 
 
 def test_a_joint_to_a_body_that_is_not_open_is_not_moved_in_silence(tmp_path):
