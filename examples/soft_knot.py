@@ -87,8 +87,9 @@ SLACK, EVEN, LOOSE = 0.005, 0.8, 60
 """Newtons below which an end is slack: 0.05 still hold a knot shut that opens in no hand. Share of the other end's
 tension above which a hand eases its own; actions by which both hands go on once both ends are slack."""
 
-TIMES, MOST = 8, 300
-"""How often the knot is slid and locked at most, and actions of a slide, of a lock and of easing at most."""
+TIMES, TWICE, MOST = 8, 2, 300
+"""How often the knot is slid and locked at most, how often in turn it must hold, and actions of a slide, of a lock and of
+easing at most."""
 
 DISPLACED = np.array([-0.0015, 0.0010, 0.0])
 """Where the first throw then lies, from where it would lie at the vessel."""
@@ -143,13 +144,21 @@ class Knotting(Knotter):
     UP, LOCKED, TIGHT = np.array([-0.031, 0.047, 0.039]), 10.0, 0.1
     FURTHER = 5
     BROUGHT = (*Knotter.BROUGHT[:3], (0.0015, 0.0080, -0.010, ACROSS))
-    IN = 0.012
-    """Taken so near, and through the loop so far from the tissue, that the left tool does not lean over the pad."""
+    IN, SHARE = 0.012, 0.45
+    """Taken so near, and through the loop so far from the tissue, that the left tool does not lean over the pad; of a
+    small loop no further than this share of its length."""
 
     def bring(self) -> Iterator[Array]:
         """As ever, with the free end where the left hand can take it."""
         yield from super().bring()
         yield from self.turn(RIGHT)
+
+    def gap(self) -> Array:
+        """As ever, within the loop: that ends where the strand lies over the short end."""
+        points = self.goal.points()
+        strand = points[self.goal.leaves(points) : self.end(RIGHT)] - self.goal.short
+        over = strand[strand[:, 0] > 0.0, 1]
+        return self.between(min(self.IN, self.SHARE * float(over[0])) if len(over) else self.IN)
 
     def turn(self, number: int, within: float = 0.0) -> Iterator[Array]:
         """A hand turns about its tool until the free end runs away from the tissue, ``within`` an angle in radians."""
@@ -181,14 +190,15 @@ class Knotting(Knotter):
         return pull > TAUT and length < CLOSE
 
     def draw_apart(self) -> Iterator[Array]:
-        """Slide and lock the knot until it holds the wound closed by itself, both ends slack in the hands."""
-        goal = self.goal
+        """Slide and lock the knot until it has held the wound closed by itself twice, both ends slack in the hands."""
+        goal, held = self.goal, 0
         assert isinstance(goal, Sewn)
         for count in range(TIMES):
             yield from self.slide(goal, min(SNUG + count * HARDER, self.LOCKED))
             yield from self.lock()
             yield from self.ease()
-            if goal.gap() < MEETING and self.slack():  # taut ends would keep the lips shut
+            held = held + 1 if goal.gap() < MEETING and self.slack() else 0  # taut ends would keep the lips shut
+            if held == TWICE:
                 return
 
     def slide(self, goal: Sewn, most: float) -> Iterator[Array]:

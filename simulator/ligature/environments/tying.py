@@ -161,11 +161,15 @@ class Tier:
         return self.goal.pull(number)
 
     def gap(self) -> Array:
-        """The middle (3,) of the loop beside the vessel: between the short end and the strand on its other side."""
-        points, count = self.goal.points(), round(self.IN / self.goal.length)
+        """The middle (3,) of the loop where the left tool reaches down through it."""
+        return self.between(self.IN)
+
+    def between(self, far: float) -> Array:
+        """The middle (3,) between the short end and the strand on its other side, ``far`` from the vessel."""
+        points, count = self.goal.points(), round(far / self.goal.length)
         ahead, low, last = points[:, 1] - self.goal.vessel[1], self.goal.beside(points), self.end(RIGHT)
         strand = np.arange(self.goal.leaves(points), last)
-        beyond = strand[ahead[strand] > self.IN]
+        beyond = strand[ahead[strand] > far]
         return np.asarray(0.5 * (points[low - count] + points[beyond[0] if len(beyond) else strand[0]]))
 
     def laced(self) -> bool:
