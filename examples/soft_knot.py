@@ -88,8 +88,8 @@ SLACK, EVEN, LOOSE = 0.005, 0.8, 60
 tension above which a hand eases its own; actions by which both hands go on once both ends are slack."""
 
 TIMES, TWICE, MOST = 8, 2, 300
-"""How often the knot is slid and locked at most, how often in turn it must hold, and actions of a slide, of a lock and of
-easing at most."""
+"""How often the knot is slid and locked at most, how often in turn it must hold, and actions of a slide, of a lock and
+of easing at most."""
 
 DISPLACED = np.array([-0.0015, 0.0010, 0.0])
 """Where the first throw then lies, from where it would lie at the vessel."""
