@@ -26,7 +26,7 @@ RENDER_MODES = ("rgb_array",)
 def check_options(
     task: Any, action: Any, observation: Any, reward: Any, size: Any, max_steps: Any, render_mode: Any
 ) -> None:
-    """Raise ValueError for an option that is none of those allowed, with these."""
+    """Raise ValueError for an option that is none of those allowed, and name these."""
     for name, value, allowed in (
         ("task", task, tuple(GOALS)), ("action", action, ("cartesian", "joint")),
         ("observation", observation, ("state", "image", "both")), ("reward", reward, ("dense", "sparse")),
@@ -46,7 +46,7 @@ def check_options(
 
 
 def arm_names(task: str, given: str | Sequence[str] | None) -> tuple[str, ...]:
-    """Names of the arms that act; ValueError where the task needs more or fewer."""
+    """Names of the arms that act; ValueError where the task needs more or fewer, TypeError for what is no name."""
     own = GOALS[task].arms
     if not isinstance(given, str | Sequence | None):
         raise TypeError(f"arm is {given!r}; it must be the name of an arm, or a list of names")
