@@ -51,18 +51,21 @@ def test_pads_whose_limit_alone_changes_hold_as_those_that_are_set_anew(seed: in
         rng = np.random.default_rng(seed)
         bench = Bench([body(0, Sphere(1e-4), at=(0.01, 0.0, 0.01)), body(1, Sphere(1e-4), at=(0.02, 0.0, 0.01))])
         rod = bench.add(from_material(line(20, 0.03), 2e-4, 1e9, 1200.0, friction=0.5))
-        points = rng.uniform(-1e-3, 1e-3, (2, 2, 3)) - [0.0, 0.0, 0.01]
+        points = list(rng.uniform(-1e-3, 1e-3, (2, 2, 3)) - [0.0, 0.0, 0.01])  # the same arrays in every tick
         normal = np.array([0.0, 1.0, 0.0])
-        forces = []
+        forces, remade = [], []
         for _ in range(ticks):
             limits = rng.uniform(0.0, 2.0, 2)
             pads = [
                 JawPads(b, points[b].copy() if anew else points[b], normal, limit) for b, limit in enumerate(limits)
             ]
+            rows = rod._constraint_rows[1]
             rod.set_pads(pads)
+            remade.append(rod._constraint_rows[1] is not rows)
             bench.twist[0][:3] = rng.normal(0.0, 0.05, 3)
             bench.step()
             forces.append([rod.grasped(b)[1] for b in (0, 1)])
+        assert remade == [True] + [anew] * (ticks - 1)
         return np.array([*np.ravel(forces), *rod.positions.ravel()])
 
     anew, kept = held(True), held(False)

@@ -353,9 +353,7 @@ SUTURE = (
     Key("USP size", T, "", doc="such as 2-0"),
     Key("density", N, 1200.0, "kg/m³", "density", least=0.0, above=True),
     Key("youngs modulus", N, 2.0e9, "Pa", "Young's modulus", least=0.0, above=True),
-    Key(
-        "poisson ratio", N, 0.4, doc="ratio that gives the shear modulus, at most 0.5", least=-1.0, most=0.5, above=True
-    ),
+    Key("poisson ratio", N, 0.4, doc="ratio that gives the shear modulus, at most 0.5 either way", most=0.5),
     Key("damping time", N, 0.002, "s", "bending damping over bending stiffness", least=0.0),
     Key("yield strain", N, doc="strain at the surface above which a bend is permanent; elastic when absent", least=0.0),
     Key("elements", U, 40, doc="number of elements"),
