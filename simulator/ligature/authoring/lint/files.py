@@ -135,11 +135,10 @@ def unit_smell(subject: Subject) -> Iterator[Finding]:
     places = [b.pose("location")[0] for b in subject.bodies.values()]
     corners = [np.asarray(p) for p in places]
     for body in subject.bodies.values():
-        surface = subject.surface(body)
-        if surface is not None and len(surface[0]):
-            corners += [
-                np.asarray(body.pose("location")[0]) + extreme for extreme in (surface[0].min(0), surface[0].max(0))
-            ]
+        mesh = subject.outside(body)
+        if mesh is not None and len(mesh.vertices):
+            place, vertices = np.asarray(body.pose("location")[0]), mesh.vertices * body.number("scale")
+            corners += [place + vertices.min(0), place + vertices.max(0)]
     if len(corners) < 2:
         return
     size = float(np.ptp(np.array(corners), axis=0).max())

@@ -113,11 +113,15 @@ class Subject:
 
     def surface(self, element: Element) -> tuple[Array, Faces] | None:
         """The whole mesh as the simulator scales it, welded, in metres: the visual one, else that of collisions."""
-        mesh = self.mesh(element, "mesh") or self.mesh(element, "collision mesh")
+        mesh = self.outside(element)
         if mesh is None:
             return None
         vertices, faces = joined(mesh.parts)
         return vertices * element.number("scale"), faces
+
+    def outside(self, element: Element) -> Mesh | None:
+        """The visual mesh, else that of collisions, as it is in its file."""
+        return self.mesh(element, "mesh") or self.mesh(element, "collision mesh")
 
     def _load(self, path: Path) -> Mesh | None:
         if path not in self._meshes:
