@@ -15,6 +15,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
+REPEAT = 2.0
+"""Seconds between two reports of the same: a client may repeat what fails a thousand times a second."""
+
 _GROUP_TRIES, _GROUP_PAUSE = 4, 0.11
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
@@ -147,6 +150,21 @@ def _schedules() -> dict[int, tuple[int, os.sched_param]]:
         with suppress(OSError):  # it has ended
             found[thread] = os.sched_getscheduler(thread), os.sched_getparam(thread)
     return found
+
+
+class Reported:
+    """What was reported within the last ``REPEAT`` seconds."""
+
+    def __init__(self) -> None:
+        self._times: dict[str, float] = {}
+
+    def is_new(self, text: str, now: float) -> bool:
+        """Whether ``text`` is to be reported at ``now`` (s, monotonic), which counts as done then."""
+        self._times = {text: at for text, at in self._times.items() if now - at < REPEAT}
+        if text in self._times:
+            return False
+        self._times[text] = now
+        return True
 
 
 def ending(status: int) -> str:

@@ -9,6 +9,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from ligature.cli.recorder import Recorder
 from ligature.model.commands import Command, MarkPhase
 from ligature.model.messages import Message, handle
 from ligature.paths import printable
-from ligature.process import report
+from ligature.process import Reported, report
 from ligature.simulation import Simulation
 
 TICK = 1e-3
@@ -44,9 +45,6 @@ MOST_NOTED = 8
 
 MOST_PRINTED = 5
 """Findings a second that are printed, the worst ones."""
-
-REPEAT = 2.0
-"""Seconds until the same finding is printed again."""
 
 WINDOW = 1000
 """Updates over which the loop's figures are taken."""
@@ -106,7 +104,7 @@ class Loop:
         self._updates = 0
         self._mark_updates = 0
         self._warned = 0
-        self._printed: dict[str, float] = {}
+        self._printed = Reported()
 
     def end(self) -> None:
         """The run is over."""
@@ -201,7 +199,5 @@ class Loop:
         times = Counter(map(str, worst))
         for text in reversed(list(severities)[:MOST_NOTED]):
             self._block.note(severities[text], text)
-        self._printed = {text: at for text, at in self._printed.items() if now - at < REPEAT}
-        for text in [text for text in severities if text not in self._printed][:MOST_PRINTED]:
-            self._printed[text] = now
+        for text in islice((text for text in severities if self._printed.is_new(text, now)), MOST_PRINTED):
             report("warning", text if times[text] == 1 else f"{text} ({times[text]} times)")

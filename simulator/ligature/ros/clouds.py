@@ -19,6 +19,7 @@ from std_msgs.msg import Float32
 from ligature.model.clouds import LARGEST, Cloud
 from ligature.model.frames import pose7_matrix
 from ligature.model.scene import Scene
+from ligature.process import REPEAT
 from ligature.ros.intake import allow_bytes
 from ligature.ros.parameters import Server, look_up
 
@@ -31,8 +32,6 @@ DEFAULT_SIZE = 4
 """Size of a point in pixels until a client sets another."""
 
 WHITE = 255
-WARNING_PAUSE = 2.0
-"""Seconds between two warnings."""
 
 
 class Clouds:
@@ -75,7 +74,7 @@ class Clouds:
             try:
                 take(topic, message)
             except ValueError as error:
-                rospy.logwarn_throttle(WARNING_PAUSE, f"{topic}: {error}")
+                rospy.logwarn_throttle(REPEAT, f"{topic}: {error}")
 
         return receive
 

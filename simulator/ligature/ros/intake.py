@@ -17,14 +17,13 @@ from rospy.impl.tcpros_base import TCPROSTransportProtocol
 from rospy.impl.tcpros_pubsub import TCPROSSub
 from rospy.impl.tcpros_service import TCPService
 
+from ligature.process import REPEAT
+
 MOST_BYTES = 32 * 1024
 """Most bytes of a message or request; 250 joints with names and all of position, velocity and effort take 20 KB."""
 
 _ALLOWED: dict[str, int] = {}
 """Most bytes of a message on topics that take larger ones."""
-
-WARNING_PAUSE = 2.0
-"""Seconds between two warnings."""
 
 _LENGTH = struct.Struct("<I")
 
@@ -40,9 +39,7 @@ class Oversized:
         """Count a message on the topic or service ``name`` and warn."""
         with self._lock:
             self.count += 1
-        rospy.logwarn_throttle(
-            WARNING_PAUSE, f"{name}: rejected a message of {size} bytes; the maximum is {MOST_BYTES} bytes"
-        )
+        rospy.logwarn_throttle(REPEAT, f"{name}: rejected a message of {size} bytes; the maximum is {MOST_BYTES} bytes")
 
 
 oversized = Oversized()

@@ -11,11 +11,10 @@ from std_msgs.msg import Float64MultiArray
 from ligature.model.commands import PluginCommand
 from ligature.model.plugins import topic_rows
 from ligature.model.scene import Scene
+from ligature.process import REPEAT
 from ligature.ros.conversion import Record
 
 QUEUE = 10
-WARNING_PAUSE = 2.0
-"""Seconds between two warnings."""
 
 
 class PluginTemplate:
@@ -65,7 +64,7 @@ def _taker(
             command.check()
             push(command)
         except ValueError as error:
-            rospy.logwarn_throttle(WARNING_PAUSE, f"{topic}: {error}")
+            rospy.logwarn_throttle(REPEAT, f"{topic}: {error}")
 
     return take
 

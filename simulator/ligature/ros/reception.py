@@ -23,12 +23,11 @@ from ligature.bus import Outbox, Throttle, Watchdog
 from ligature.bus.codec import CodecError, Message
 from ligature.model.commands import PHASE_TOPIC, Command, MarkPhase, Release, Reset
 from ligature.model.scene import Scene
+from ligature.process import REPEAT
 from ligature.ros import conversion
 from ligature.ros.schedule import Key
 
 QUEUE = 10
-WARNING_PAUSE = 2.0
-"""Seconds between two warnings of one kind."""
 
 WORLD: Key = ("world", 0)
 RESETS = {"Reset": False, "Reset/Bodies": True, "ResetBodies": True}
@@ -141,4 +140,4 @@ class Reception:
 
     def _refuse(self, topic: str, error: ValueError) -> None:
         self.rejected += 1
-        rospy.logwarn_throttle(WARNING_PAUSE, f"{topic}: command rejected: {error}")
+        rospy.logwarn_throttle(REPEAT, f"{topic}: command rejected: {error}")

@@ -22,6 +22,7 @@ from std_msgs.msg import Empty
 from ligature.model.commands import ActuatorCommand, BodyCommand, Command, CommandType, Release
 from ligature.model.frames import frame, matrix_pose7, pose7_matrix, rpy_matrix
 from ligature.model.scene import ArmDescription, ArmKind, Scene
+from ligature.process import REPEAT
 from ligature.robots.arm import CHALLENGE
 from ligature.robots.commands import VERBS
 from ligature.robots.ecm import SrcCamera
@@ -238,7 +239,7 @@ def _listen(topic: str, type_: type, take: Callable[[Any], None]) -> None:
         try:
             take(message)
         except ValueError as error:
-            rospy.logwarn_throttle(2.0, f"{topic}: command rejected: {error}")
+            rospy.logwarn_throttle(REPEAT, f"{topic}: command rejected: {error}")
 
     rospy.Subscriber(topic, type_, listen, queue_size=10, tcp_nodelay=True)
 

@@ -13,6 +13,7 @@ import rospy
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool, Empty, Float64, Float64MultiArray, String
 
+from ligature.process import REPEAT
 from ligature.robots.commands import ArmCommand, StateCommand
 from ligature.ros.arms.latched import Latched
 from ligature.ros.arms.outlet import ArmOutlet
@@ -138,7 +139,7 @@ def _relay(publishers: Sequence[Any], content: Callable[[Any], Any]) -> Callable
 def _press(message: Any) -> Joy | None:
     """A button event of now: 1 pressed, 0 released, 2 clicked; None without a button, which clients cannot read."""
     if not message.buttons:
-        rospy.logwarn_throttle(2.0, "console: a pedal needs a button: send 'buttons: [1]' (pressed) or [0] (released)")
+        rospy.logwarn_throttle(REPEAT, "console: a pedal needs a button: send 'buttons: [1]' (pressed) or [0]")
         return None
     event = Joy(buttons=list(message.buttons[:1]))
     event.header.stamp = rospy.Time.now()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -13,6 +12,7 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool, Empty, Float64, String
 
 from ligature.model.scene import ArmKind
+from ligature.process import Reported
 from ligature.robots.arm import CHALLENGE
 from ligature.ros.arms.latched import Latched
 
@@ -40,9 +40,6 @@ _LOGS: dict[str, Callable[[str], None]] = {
     "warning": rospy.logwarn,
     "status": rospy.logdebug,
 }
-WARNING_PAUSE = 2.0
-"""Seconds between two equal lines of the log, and between two equal warnings of an arm that is not ready: a stream of
-commands to it would make as many."""
 NOT_READY = "arm not ready"
 
 
@@ -99,8 +96,8 @@ class EventTopics:
         topics = {**LATCHED, **LATCHED_OF_KIND[kind]}
         self._publishers = {name: Latched(f"{root}/{name}", type_) for name, type_ in topics.items()}
         self._types = topics
-        self._logged: dict[str, float] = {}
-        self._warned: dict[str, float] = {}
+        self._logged = Reported()
+        self._warned = Reported()
         self.error = ""
 
     def publish(self, name: str, value: Any) -> None:
@@ -135,21 +132,10 @@ class EventTopics:
 
     def _repeats(self, warning: str) -> bool:
         """Whether a warning of an arm that is not ready was published a moment ago."""
-        if NOT_READY not in warning:
-            return False
-        now = time.monotonic()
-        if now - self._warned.get(warning, -math.inf) < WARNING_PAUSE:
-            return True
-        self._warned = {text: at for text, at in self._warned.items() if now - at < WARNING_PAUSE} | {warning: now}
-        return False
+        return NOT_READY in warning and not self._warned.is_new(warning, time.monotonic())
 
     def _log(self, name: str, value: Any) -> None:
-        """Errors go to the log as well, the same one at most every two seconds."""
-        if name not in _LOGS:
-            return
-        now = time.monotonic()
-        if now - self._logged.get(value, -math.inf) > WARNING_PAUSE:
-            self._logged = {text: at for text, at in self._logged.items() if now - at < WARNING_PAUSE}
-            self._logged[value] = now
+        """What is an error, a warning or a status goes to the log as well, once in a while."""
+        if name in _LOGS and self._logged.is_new(value, time.monotonic()):
             direct = value.startswith(f"{CHALLENGE}/")  # names its topic, which is not below this arm's
             _LOGS[name](f"{self._root.rpartition('/')[0]}/{value}" if direct else f"{self._root}: {value}")

@@ -17,6 +17,7 @@ from std_msgs.msg import String
 
 from ligature.model.frames import inverse, matrix_pose7
 from ligature.model.scene import ArmKind, WorldSettings
+from ligature.process import REPEAT
 from ligature.ros.arms.bases import CART, bases, tip
 from ligature.ros.arms.events import Clock
 from ligature.ros.arms.latched import Latched
@@ -125,7 +126,7 @@ class _SetupArm:
     def warn(self, text: str) -> None:
         """Report why a command was rejected, on ``warning`` and, at most every two seconds, in the log."""
         self._warning.publish(text)
-        rospy.logwarn_throttle(2.0, f"{self._root}: {text}")
+        rospy.logwarn_throttle(REPEAT, f"{self._root}: {text}")
 
     def report(self, state: OperatingState) -> None:
         """Publish the operating state."""
