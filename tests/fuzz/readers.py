@@ -165,7 +165,7 @@ def read_teleop(path: Path) -> None:
     from rich.console import Console
 
     console = Console(file=io.StringIO(), width=10_000)
-    if teleop(path, (), None, None, None, True, None, None, console) != 0:
+    if teleop(path, (), None, None, None, True, None, None, "", console) != 0:
         raise Refused(console.file.getvalue())  # type: ignore[attr-defined]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -148,6 +149,22 @@ def test_power_off_disables_all_arms_and_teleoperation(wires: Wires) -> None:
     wires.heard["/system/power_off"](Empty())
     assert not wires.newest("/console/teleop/enabled").data
     assert sent == [StateCommand(index, "disable") for index in range(4)]
+
+
+@pytest.mark.parametrize("command", ["/console/set_volume", "/system/set_volume", "/console/teleop/set_scale"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -0.1, 1.1, 0.5, 1.0])
+def test_a_volume_and_a_scale_are_fractions(wires: Wires, command: str, value: float) -> None:
+    from std_msgs.msg import Float64
+
+    console(wires)
+    report = "/console/teleop/scale" if command.endswith("scale") else "/system/volume"
+    before = [message.data for message in wires.published[report]]
+    wires.heard[command](Float64(value))
+    after = [message.data for message in wires.published[report]]
+    if 0.0 < value <= 1.0:
+        assert (after, wires.logged) == ([*before, value], [])
+    else:
+        assert after == before and f"not {value:g}" in wires.logged[0]
 
 
 def test_teleoperation_hears_that_power_is_off_and_the_documented_names(

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ligature.cli.main import app
-from ligature.teleop.config import with_timeout
+from ligature.teleop.config import with_prefix, with_timeout
 from ligature.teleop.devices import mouse
 from ligature.teleop.devices.device import Reading
 from ligature.teleop.ready import names, of_devices
@@ -121,3 +121,18 @@ def test_a_right_drag_turns_the_middle_button_and_keys_are_buttons() -> None:
     assert 2 * np.arcsin(readings[0].pose[4]) == pytest.approx(0.1)
     assert [r.buttons["middle"] for r in readings][1:3] == [True, True] and not readings[-1].buttons["middle"]
     assert readings[-1].buttons["space"] and readings[-1].pose[0] == pytest.approx(mouse.OPTIONS["step"])
+
+
+@given(parts=st.lists(st.from_regex(r"[a-z][a-z0-9_]*", fullmatch=True)), begins=st.booleans(), ends=st.booleans())
+def test_topics_of_arms_begin_with_the_prefix_that_is_asked(parts: list[str], begins: bool, ends: bool) -> None:
+    text = "/" * begins + "/".join(parts) + "/" * ends
+    ready = of_devices(["touch"])
+    found = with_prefix(ready, text)
+    assert found.prefix == "".join(f"/{part}" for part in parts) + "/"
+    assert {**vars(found), "prefix": ""} == {**vars(ready), "prefix": ""}
+
+
+def test_a_prefix_that_no_name_begins_with_is_refused() -> None:
+    result = CliRunner().invoke(app, ["teleop", "--device", "touch", "--check", "--ns", "left arm"])
+    assert result.exit_code == 1
+    assert "'left arm' cannot begin names of ROS" in result.output

@@ -492,13 +492,18 @@ def teleop(
         ),
     ] = None,
     devices: Annotated[Optional[str], typer.Option("-i", help="Indices of a launch file's input devices.")] = None,  # noqa: UP045
+    namespace: Annotated[
+        str, typer.Option("--ns", help="Prefix of arms and console; replaces the file's, as 'ligature run --ns'.")
+    ] = "",
 ) -> None:
     """Drive arms on ROS with input devices: master arms, haptic pens, controllers, the keyboard."""
     from ligature.cli.teleop import teleop as run_teleop
 
     console = Console(highlight=False, soft_wrap=True)
     raise typer.Exit(
-        run_teleop(config, device or (), record, replay, calibrate, check, timeout, indices(devices), console)
+        run_teleop(
+            config, device or (), record, replay, calibrate, check, timeout, indices(devices), namespace, console
+        )
     )
 
 

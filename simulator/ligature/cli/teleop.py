@@ -13,6 +13,7 @@ from rich.console import Console
 from ligature.adf.diagnostics import AdfError
 from ligature.bus.stop import stop_on_signal
 from ligature.cli.master import DEFAULT_MASTER, master_answers
+from ligature.cli.options import name_prefix
 from ligature.paths import reason
 from ligature.teleop import config
 from ligature.teleop.config import TeleopConfig
@@ -24,13 +25,15 @@ END_TIMEOUT = 10.0
 
 def teleop(
     file: Path | None, ready: Sequence[str], record: Path | None, replay: Path | None, calibrate: str | None,
-    check: bool, timeout: float | None, devices: tuple[int, ...] | None, console: Console,
+    check: bool, timeout: float | None, devices: tuple[int, ...] | None, prefix: str, console: Console,
 ) -> int:  # fmt: skip
     """Drive until Ctrl-C; returns the exit status."""
     try:
         wanted = _configuration(file, ready, devices)
         if timeout is not None:
             wanted = config.with_timeout(wanted, timeout)
+        if prefix:
+            wanted = config.with_prefix(wanted, name_prefix(prefix))
     except (AdfError, ValueError) as error:
         console.print(str(error), style="red", markup=False)
         return 1

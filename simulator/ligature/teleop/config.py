@@ -110,6 +110,15 @@ def with_timeout(config: TeleopConfig, seconds: float) -> TeleopConfig:
     return replace(config, devices=devices)
 
 
+def with_prefix(config: TeleopConfig, text: str) -> TeleopConfig:
+    """The same for arms and a console whose topics begin with ``text``, such as ``/left``."""
+    return replace(config, prefix=_folder(text))
+
+
+def _folder(text: str) -> str:
+    return "/" + "".join(f"{part}/" for part in text.split("/") if part)
+
+
 def read(path: Path) -> TeleopConfig:
     """The configuration in a file; raises `AdfError`, whose diagnostics name file, line and what would be right."""
     return from_text(text_of(path), path)
@@ -217,7 +226,7 @@ class _Reader:
         if (node := root.get("enabled")) is not None:
             extra["enabled"] = self.flag(node, "enabled")
         if (node := root.get("prefix")) is not None:
-            extra["prefix"] = "/" + "".join(f"{part}/" for part in self.text(node, "prefix").split("/") if part)
+            extra["prefix"] = _folder(self.text(node, "prefix"))
         if (node := root.get("rcm guard")) is not None:
             extra["rcm_guard"] = self.number(node, "rcm guard", 0.0, 0.2)
         extra.update(self.phases(root, devices))

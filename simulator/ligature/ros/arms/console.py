@@ -63,7 +63,7 @@ class Console:
             self._listen(f"{root}/power_on", Empty, lambda _: self._all("enable"))
             self._listen(f"{root}/power_off", Empty, lambda _: self._power_off())
             self._listen(f"{root}/home", Empty, lambda _: self._all("home"))
-            self._listen(f"{root}/set_volume", Float64, lambda m: self._volume.publish(m.data))
+            self._listen(f"{root}/set_volume", Float64, self._set_volume)
             self._listen(f"{root}/beep", Float64MultiArray, lambda m: rospy.loginfo(f"beep {list(m.data)}"))
             self._listen(f"{root}/string_to_speech", String, lambda m: rospy.loginfo(f"string_to_speech: {m.data}"))
 
@@ -103,7 +103,13 @@ class Console:
         if 0.0 < message.data <= 1.0:
             self._report(self._scale, message.data)
         else:
-            rospy.logwarn(f"console: a scale must be above 0 and at most 1, not {message.data:g}")
+            rospy.logwarn_throttle(REPEAT, f"console: a scale must be above 0 and at most 1, not {message.data:g}")
+
+    def _set_volume(self, message: Any) -> None:
+        if 0.0 <= message.data <= 1.0:
+            self._volume.publish(message.data)
+        else:
+            rospy.logwarn_throttle(REPEAT, f"console: a volume is from 0 to 1, not {message.data:g}")
 
     def _all(self, command: str) -> None:
         """Have all arms ``enable`` or ``home``; a FAULT is ended before (as in the dVRK)."""
