@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from ligature.adf import Resolver, Severity, read_any
 from ligature.adf.writer import write_document
-from ligature.authoring.lint import RULES, Finding, lint
+from ligature.authoring.lint import OF_LOADING, RULES, Finding, lint
 from ligature.authoring.objfile import Paint, Surface, obj_texts
 from ligature.authoring.shapes import Shape, shape_mesh
+from ligature.cli.main import app
+from typer.testing import CliRunner
 
 ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 UP = {"x": 0.0, "y": 0.0, "z": 1.0}
@@ -206,6 +208,36 @@ def test_every_rule_has_a_seeded_fault() -> None:
         "file-unreferenced", "duplicate-identifier",
     }  # fmt: skip
     assert set(RULES) <= seeded
+
+
+def test_the_command_names_each_finding_at_its_object_when_authors_ask(model) -> None:
+    for _, changes in CASES:
+        found = [f for f in model(changes) if not f.rule.startswith("reader:") and f.rule not in OF_LOADING]
+        lines = (model.folder / "m.yaml").read_text().splitlines()
+        output = CliRunner().invoke(app, ["check", "--author", str(model.folder / "m.yaml")]).output
+        for finding in found:
+            (row,) = [line for line in output.splitlines() if f"{finding.key or 'model'}: {finding.message}" in line]
+            place, _, text = row.partition(f": {finding.severity.name.lower()}: ")
+            assert text.endswith(f"; {finding.hint}")
+            if finding.key:
+                assert lines[int(place.split(":")[-2]) - 2] == f"{finding.key}:"
+
+
+def test_what_another_model_of_the_launch_file_has_is_no_finding(model) -> None:
+    changes = {"bodies": ["BODY b"], "joints": [], "BODY a": None, "JOINT j": None, "ghost objects": ["GHOST g"]}
+    ghost = {
+        "name": "g",
+        "parent": "BODY elsewhere",
+        "collision shape": "SPHERE",
+        "collision geometry": {"radius": 0.1},
+    }
+    assert {f.rule for f in model({**changes, "GHOST g": ghost})} == {"reference-unresolved"}
+    (model.folder / "other.yaml").write_text("bodies: [BODY elsewhere]\nBODY elsewhere: {name: e, mass: 0}\n")
+    launch = model.folder / "launch.yaml"
+    (model.folder / "world.yaml").write_text("namespace: /x/\n")
+    launch.write_text("world config: world.yaml\nmultibody configs: [other.yaml, m.yaml]\n")
+    result = CliRunner().invoke(app, ["check", "--author", str(launch)])
+    assert "elsewhere" not in result.output
 
 
 def test_a_world_is_checked_for_what_worlds_have(tmp_path: Path) -> None:

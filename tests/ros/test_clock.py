@@ -36,15 +36,19 @@ def test_states_are_stamped_by_the_wall_clock(simulator: Program, node: Any, clo
 
     states = Listener(node, "/PSM1/operating_state", OperatingState)
     joints = Listener(node, "/PSM1/measured_js", JointState)
-    if clock is not None:
-        publisher = node.Publisher("/clock", Clock, queue_size=1, latch=True)
-        publisher.publish(Clock(node.Time.from_sec(clock)))
-    for topic in (states, joints):
-        for _ in range(3):
-            topic.wait()
-            topic.messages.clear()
-            until(lambda topic=topic: topic.messages, "a message of the run", 20.0)
-            assert abs(topic.messages[-1].header.stamp.to_sec() - time.time()) < 5.0
+    publisher = None if clock is None else node.Publisher("/clock", Clock, queue_size=1, latch=True)
+    try:
+        if publisher is not None:
+            publisher.publish(Clock(node.Time.from_sec(clock)))
+        for topic in (states, joints):
+            for _ in range(3):
+                topic.wait()
+                topic.messages.clear()
+                until(lambda topic=topic: topic.messages, "a message of the run", 20.0)
+                assert abs(topic.messages[-1].header.stamp.to_sec() - time.time()) < 5.0
+    finally:
+        if publisher is not None:
+            publisher.unregister()
 
 
 def test_every_rejection_is_reported_though_no_clock_runs(simulator: Program, node: Any) -> None:

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
 
 import ligature
-from ligature.adf import AdfError, Diagnostic, Document, Mark, ResolutionError, Resolver, Severity, read_any
+from ligature.adf import (
+    AdfError,
+    Diagnostic,
+    Document,
+    LaunchDocument,
+    Mark,
+    ResolutionError,
+    Resolver,
+    Severity,
+    read_any,
+    read_model,
+    read_world,
+)
 from ligature.adf.lacking import lack_of
+from ligature.authoring.lint import OF_LOADING, READER, lint
 from ligature.bundle import meant
 from ligature.cli.numbers import counted
 from ligature.mesh import load_mesh
@@ -29,11 +43,14 @@ def check(
     verbose: bool,
     console: Console,
     models: Sequence[int] | None = None,
+    author: bool = False,
 ) -> int:
-    """Print the findings of ``files``; returns 1 when one is an error."""
+    """Print the findings of ``files``, also those for their ``author``; returns 1 when one is an error."""
     status = 0
     for file in files:
         found = findings(file, roots, strict, models)
+        if author:
+            found = _distinct([*found, *_for_authors(file, roots, models)])
         for diagnostic in found:
             if diagnostic.severity > Severity.DEBUG or verbose:
                 console.print(str(diagnostic), style=_STYLES[diagnostic.severity], markup=False)
@@ -68,6 +85,40 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
         *_shaders(scene, resolver), *_looks(scene, resolver),
     ]  # fmt: skip
     return _distinct([*document.diagnostics, *scene.diagnostics, *later])
+
+
+def _for_authors(file: Path, roots: Sequence[Path], models: Sequence[int] | None) -> list[Diagnostic]:
+    """What would surprise the author of a model or world file, or of those of a launch file: as in Blender."""
+    resolver = Resolver.for_file(file, roots)
+    found: list[Diagnostic] = []
+    for document in _documents(file, resolver, models):
+        marks = {element.key: element.node.mark for listed in document.lists.values() for element in listed}
+        found += [
+            Diagnostic(
+                each.severity,
+                f"{each.key or document.kind}: {each.message}",
+                marks.get(each.key, document.top.mark),
+                each.hint,
+                each.rule,
+            )
+            for each in lint(document, resolver)
+            if not each.rule.startswith(READER) and each.rule not in OF_LOADING
+        ]
+    return found
+
+
+def _documents(file: Path, resolver: Resolver, models: Sequence[int] | None) -> Iterator[Document]:
+    """The file, or the world file and the chosen models of a launch file, as far as they can be read."""
+    with suppress(AdfError):
+        document = read_any(file, resolver)
+        if not isinstance(document, LaunchDocument):
+            yield document
+            return
+        chosen = [document.models[i] for i in range(len(document.models)) if models is None or i in models]
+        for reference, read in ((document.world, read_world), *((each, read_model) for each in chosen)):
+            if reference is not None and reference.path is not None:
+                with suppress(AdfError):
+                    yield read(reference.path, resolver)
 
 
 def _shaders(scene: Scene, resolver: Resolver) -> list[Diagnostic]:

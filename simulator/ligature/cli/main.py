@@ -163,12 +163,16 @@ def check(
     root: Roots = None,
     verbose: Annotated[bool, typer.Option("-v", help="Also list keys without effect.")] = False,
     models: Models = None,
+    author: Annotated[
+        bool,
+        typer.Option("--author", help="Also report what may surprise authors, as Blender's Check Scene."),
+    ] = False,
 ) -> None:
     """Report every problem of a scene as file:line:column; exit status 1 on errors."""
     from ligature.cli.check import check as run_check
 
     console = Console(highlight=False, soft_wrap=True)
-    raise typer.Exit(run_check(files, root or [], strict, verbose, console, indices(models)))
+    raise typer.Exit(run_check(files, root or [], strict, verbose, console, indices(models), author))
 
 
 @app.command()

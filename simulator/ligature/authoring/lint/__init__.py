@@ -11,6 +11,12 @@ from ligature.authoring.lint.subject import RULES, Finding, Subject
 OF_ALL_FILES = ("duplicate-identifier", "clipping-ratio")
 """Rules that hold for world files too; all others are about models."""
 
+OF_LOADING = ("mesh-missing", "path-outside", "reference-elsewhere", "reference-unresolved")
+"""Rules about what loading the scene reports too, with the other files that it has."""
+
+READER = "reader:"
+"""Begins the rules of what the reader of the format finds."""
+
 
 def lint(
     document: Document,
@@ -30,7 +36,7 @@ def lint_by_rule(
 ) -> Iterator[list[Finding]]:
     """The findings of `lint`, those of one rule at a time."""
     yield [
-        Finding(f"reader:{d.code}", d.severity, _key_of(document, d.message), d.message, d.hint)
+        Finding(f"{READER}{d.code}", d.severity, _key_of(document, d.message), d.message, d.hint)
         for d in document.diagnostics
         if d.severity >= Severity.WARNING
     ]
@@ -46,4 +52,16 @@ def _key_of(document: Document, message: str) -> str:
     return next((key for key in sorted(keys, key=len, reverse=True) if f"'{key}'" in message), "")
 
 
-__all__ = ["OF_ALL_FILES", "RULES", "Finding", "Subject", "bodies", "files", "joints", "lint", "lint_by_rule"]
+__all__ = [
+    "ELSEWHERE",
+    "OF_ALL_FILES",
+    "READER",
+    "RULES",
+    "Finding",
+    "Subject",
+    "bodies",
+    "files",
+    "joints",
+    "lint",
+    "lint_by_rule",
+]

@@ -41,7 +41,7 @@ def mesh_missing(subject: Subject) -> Iterator[Finding]:
         try:
             real = subject.resolver.allow(path)
         except ResolutionError as error:
-            yield Finding("path-outside", Severity.ERROR, element.key, str(error), "keep meshes with the scene")
+            yield Finding("path-outside", Severity.ERROR, element.key, error.diagnostic.message, "keep meshes with the scene")
             continue
         fallback = key == "collision mesh" and (subject.folder(element, HIGH) / path.name).is_file()
         if not real.is_file():
@@ -113,20 +113,25 @@ def low_equals_high(subject: Subject) -> Iterator[Finding]:
 
 @rule("file-unreferenced")
 def file_unreferenced(subject: Subject) -> Iterator[Finding]:
-    """Meshes that nothing names are left over; another file of the folder may use them."""
+    """Meshes that nothing names are left over; another file of the folder may use them.
+
+    A folder that is not below the file's own belongs to several models, whose files may lie anywhere.
+    """
+    home = real_path(subject.document.path.parent)
     used = {real_path(path) for _, _, path in _mesh_files(subject)}
     folders = {path.parent for path in used}
     others = [
         f for f in subject.document.path.parent.glob("*.yaml") if real_path(f) != real_path(subject.document.path)
     ]
     texts = [subject.resolver.read_text(f) for f in others if subject.resolver.exists(f)]
-    for folder in sorted(f for f in folders if f.is_dir()):
+    for folder in sorted(f for f in folders if f.is_dir() and f.is_relative_to(home)):
         for file in sorted(folder.iterdir()):
             if file.suffix.lower() not in (".obj", ".stl", ".3ds") or real_path(file) in used:
                 continue
             if not any(file.name in text for text in texts):
                 message = f"nothing refers to '{file.name}' in {folder.name}"
-                yield Finding("file-unreferenced", Severity.WARNING, "", message, "remove it")
+                hint = "remove it, unless a file of another folder uses it"
+                yield Finding("file-unreferenced", Severity.WARNING, "", message, hint)
 
 
 @rule("unit-smell")
@@ -168,9 +173,9 @@ def legacy_key(subject: Subject) -> Iterator[Finding]:
 
 @rule("float-noise")
 def float_noise(subject: Subject) -> Iterator[Finding]:
-    """Numbers that are meant to be zero."""
+    """Numbers of vectors and poses that are meant to be zero; masses, moments and damping may well be small."""
     for element in subject.objects:
-        noisy = [path for path, value in element.given().items() if _noisy(value)]
+        noisy = [path for path, value in element.given().items() if isinstance(value, tuple) and _noisy(value)]
         if noisy:
             message = f"'{noisy[0]}' holds numbers that are nearly zero"
             yield Finding("float-noise", Severity.INFO, element.key, message, "they are the rounding of an exporter")
