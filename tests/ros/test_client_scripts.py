@@ -44,8 +44,19 @@ def at_rest(arm: Any, goal: np.ndarray) -> None:
     tolerance = np.full(len(goal), SETTLED[1])
     if len(goal) < len(JOINT_NAMES):
         tolerance[2] = SETTLED[0]
-    off = np.abs(arm.measured_jp() - goal)
-    assert (off <= tolerance).all(), f"off by {off}"
+    # what ends a move may come before the state that it ended with
+    until(
+        lambda: (np.abs(arm.measured_jp() - goal) <= tolerance).all(),
+        lambda: f"at its goal, and not off by {np.abs(arm.measured_jp() - goal)}", 5.0,
+    )  # fmt: skip
+
+
+def commanded(arm: Any, goal: np.ndarray) -> None:
+    """The set-point of the tip is at ``goal``."""
+    until(
+        lambda: np.linalg.norm(arm.setpoint_cp()[:3] - goal[:3]) < SETTLED[0],
+        lambda: f"{np.linalg.norm(arm.setpoint_cp()[:3] - goal[:3])} m from the goal", 5.0,
+    )  # fmt: skip
 
 
 def stream(send: Callable[[float], None], seconds: float, rate: float) -> None:
@@ -61,7 +72,7 @@ def stream(send: Callable[[float], None], seconds: float, rate: float) -> None:
 
 def run_move_cp_example(arm: Any) -> None:
     """crtk_move_cp_example: there and back along each axis, each move waited for."""
-    from tests.ros.crtk import pose_distance, shifted
+    from tests.ros.crtk import shifted
 
     ready(arm)
     start = arm.setpoint_cp()
@@ -71,8 +82,7 @@ def run_move_cp_example(arm: Any) -> None:
             motion = arm.move_cp(goal)
             assert motion.wait(timeout=10.0), "the move did not end"
             assert not motion.is_busy()
-            metres, _ = pose_distance(arm.setpoint_cp(), goal)
-            assert metres < SETTLED[0], f"{metres} m from the goal"
+            commanded(arm, goal)
 
 
 def run_servo_cp_example(arm: Any) -> None:
@@ -116,7 +126,8 @@ def run_servo_cv_example(arm: Any) -> None:
         seen.append(pose_distance(arm.setpoint_cp(), start)[0])
 
     stream(send, 1.0, 100.0)
-    assert 0.1 < max(seen) / (0.02 / np.pi) < 1.2  # less where simulated time lags behind the clock
+    # less where simulated time lags behind the clock, more where a command comes late: the one before it lasts
+    assert 0.1 < max(seen) / (0.02 / np.pi) < 2.0
     steady(lambda: arm.setpoint_cp()[:3], 0.3, 1e-7, "it stands without commands", 3.0)
 
 
@@ -171,7 +182,7 @@ def run_arm_test(arm: Any) -> None:
         for way in (0.05, -0.05, 0.0):
             target = shifted(tip, way * np.eye(3)[axis])
             assert arm.move_cp(target).wait(), "a Cartesian move did not end"
-            assert np.linalg.norm(arm.setpoint_cp()[:3] - target[:3]) < SETTLED[0]
+            commanded(arm, target)
 
 
 def test_dvrk_arm_test_runs_on_all_arms(arms):
@@ -254,12 +265,17 @@ def run_gravity_collection(arm: Any) -> None:
         goal = angles.copy()
         goal[:3] = np.deg2rad(yaw), np.deg2rad(pitch), insertion
         assert arm.move_jp(goal).wait(), f"{yaw}, {pitch}, {insertion}: the move did not end"
-        position, _, effort = arm.measured_js()
+        effort = arm.measured_js()[2]
         assert len(effort) >= 3
         assert np.isfinite(effort).all()
-        assert abs(position[0] - goal[0]) < SETTLED[1], "yaw is within its limits: it must be reached"
+        yaw_goal = goal[0]
+        until(
+            lambda yaw_goal=yaw_goal: abs(arm.measured_jp()[0] - yaw_goal) < SETTLED[1],
+            "yaw is within its limits: it must be reached", 5.0,
+        )  # fmt: skip
+    moves = len(angles) == 4
     last = arm.move_jp([0.0, 0.0, 0.12, 0.0])
-    assert last.wait(timeout=5.0) == (len(angles) == 4), "four values move an ECM, and a PSM not"
+    assert last.wait(timeout=20.0 if moves else 5.0) == moves, "four values move an ECM, and a PSM not"
     assert arm.move_jp(np.where(np.arange(len(angles)) == 2, 0.12, 0.0)).wait()
 
 
