@@ -181,6 +181,23 @@ def test_pictures_of_the_sky_that_are_missing_are_reported(tmp_path: Path) -> No
     (tmp_path / "launch.yaml").write_text(launch)
     (tmp_path / "sky").mkdir()
     for face in faces[:3]:
-        (tmp_path / "sky" / f"{face}.png").touch()
+        Image.new("RGB", (2, 2)).save(tmp_path / "sky" / f"{face}.png")
     found = [d.message for d in findings(tmp_path / "launch.yaml", [], False) if d.message.startswith("sky box")]
     assert found == [f"sky box: the picture '{face}.png' of its {face} does not exist" for face in faces[3:]]
+
+
+@pytest.mark.parametrize("key", ["map_Kd", "map_Bump", "map_Pr", "map_Pm", "map_ao", "refl"])
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 1.0], ids=lambda share: f"{share:g} of it")
+def test_pictures_that_cannot_be_read_are_reported_whatever_they_are_for(
+    tmp_path: Path, key: str, share: float
+) -> None:
+    picture = tmp_path / "t.png"
+    Image.effect_noise((32, 32), 50.0).save(picture)
+    whole = picture.read_bytes()
+    picture.write_bytes(whole[: int(share * len(whole))])
+    (tmp_path / "a.obj").write_text(TRIANGLE)
+    (tmp_path / "m.mtl").write_text(f"newmtl a\n{key} t.png\n")
+    body = {"name": "a", "mass": 1, "mesh": "a.obj", "collision shape": "SPHERE", "collision geometry": {"radius": 1}}
+    (tmp_path / "m.yaml").write_text(yaml.safe_dump({"bodies": ["A"], "A": body}))
+    found = [d for d in findings(tmp_path / "m.yaml", [], False) if "not a picture" in d.message]
+    assert [d.mark.file for d in found if d.mark] == ([] if share == 1.0 else [picture])

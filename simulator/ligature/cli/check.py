@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +29,7 @@ from ligature.bundle import meant
 from ligature.cli.numbers import counted
 from ligature.mesh import load_mesh
 from ligature.model import reach
+from ligature.model.pictures import read_picture, unreadable
 from ligature.model.scene import Scene
 from ligature.physics import guard, inertias, overlaps, springs
 from ligature.physics.engine import Engine
@@ -138,24 +139,42 @@ def _shaders(scene: Scene, resolver: Resolver) -> list[Diagnostic]:
 
 
 def _looks(scene: Scene, resolver: Resolver) -> list[Diagnostic]:
-    """What is wrong in mesh files that are drawn, and pictures that are missing: their textures, those of the sky."""
+    """What is wrong in mesh files that are drawn, and in pictures: their textures, those of the sky."""
     found: list[Diagnostic] = []
+    pictures: list[Path] = []
     for face, picture in (scene.world.skybox or {}).items():
         lack = lack_of(picture)
         if lack is not None:
             message = f"sky box: the picture '{picture.name}' of its {face} {lack.fault}"
             found.append(Diagnostic(Severity.WARNING, message, Mark(picture, 1, 1), lack.hint, "render"))
+        else:
+            pictures.append(picture)
     visuals = [*(body.visual for body in scene.bodies), *(ghost.visual for ghost in scene.ghosts)]
     for path in dict.fromkeys(visual.mesh for visual in visuals if visual.visible):
         if path is None:
             continue
         try:
-            found += [d for d in load_mesh(path, resolver).diagnostics if d.severity > Severity.DEBUG]
+            mesh = load_mesh(path, resolver)
+            found += [d for d in mesh.diagnostics if d.severity > Severity.DEBUG]
+            materials = [part.material for part in mesh.parts if part.material is not None]
+            pictures += [
+                value for material in materials for value in vars(material).values() if isinstance(value, Path)
+            ]
         except AdfError as error:
             hints = (error.diagnostics[0].hint, "what has this mesh is drawn without it; AMBF leaves it out")
             hint = "; ".join(filter(None, hints))
             found += [replace(d, severity=Severity.WARNING, hint=hint) for d in error.diagnostics]
-    return found
+    return [*found, *_broken(dict.fromkeys(pictures))]
+
+
+def _broken(pictures: Iterable[Path]) -> Iterator[Diagnostic]:
+    for path in pictures:
+        try:
+            read_picture(path)
+        except FileNotFoundError:
+            pass  # as the file that names it has stated
+        except (OSError, ValueError) as error:
+            yield unreadable(path, error)
 
 
 def _at_start(scene: Scene) -> list[Diagnostic]:

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from ligature.adf import Diagnostic, Mark, Severity
+
 FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "PPM", "WEBP")
 """What is read. Pillow knows more; of those some start other programs (PostScript)."""
 
@@ -43,6 +45,12 @@ def read_picture(path: Path) -> Image.Image:
         EOFError, AssertionError, struct.error, zlib.error,
     ) as error:  # fmt: skip
         raise PictureError(str(error) or type(error).__name__) from None
+
+
+def unreadable(path: Path, error: Exception) -> Diagnostic:
+    """The finding about a texture ``path`` that could not be read because of ``error``."""
+    message = f"texture '{path.name}' is not a picture that can be read: {error}"
+    return Diagnostic(Severity.WARNING, message, Mark(path, 1, 1), "", "render")
 
 
 def _eight_bits(picture: Image.Image) -> Image.Image:

@@ -7,8 +7,8 @@ from pathlib import Path
 import moderngl
 from PIL import Image
 
-from ligature.adf import AdfError, Diagnostic, Mark, Severity
-from ligature.model.pictures import read_picture
+from ligature.adf import AdfError
+from ligature.model.pictures import read_picture, unreadable
 
 
 class Textures:
@@ -41,8 +41,7 @@ class Textures:
         except FileNotFoundError:
             return None  # as the mesh reader has stated
         except (OSError, ValueError) as error:
-            message = f"texture '{path.name}' is not a picture that can be read: {error}"
-            self._problems.append(AdfError(Diagnostic(Severity.WARNING, message, Mark(path, 1, 1), "", "render")))
+            self._problems.append(AdfError(unreadable(path, error)))
             return None
         if max(image.size) > self._context.info["GL_MAX_TEXTURE_SIZE"]:
             image.thumbnail((self._context.info["GL_MAX_TEXTURE_SIZE"],) * 2)

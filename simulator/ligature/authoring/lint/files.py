@@ -41,7 +41,9 @@ def mesh_missing(subject: Subject) -> Iterator[Finding]:
         try:
             real = subject.resolver.allow(path)
         except ResolutionError as error:
-            yield Finding("path-outside", Severity.ERROR, element.key, error.diagnostic.message, "keep meshes with the scene")
+            yield Finding(
+                "path-outside", Severity.ERROR, element.key, error.diagnostic.message, "keep meshes with the scene"
+            )
             continue
         fallback = key == "collision mesh" and (subject.folder(element, HIGH) / path.name).is_file()
         if not real.is_file():
