@@ -8,7 +8,7 @@ import pytest
 from tests.cockpit.assisted import Page
 
 
-@pytest.mark.parametrize("seed", [0, 1, 3])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
 def test_three_presses_take_a_needle_through_tissue(seed: int) -> None:
     page = Page("needle_insertion", "PSM2")
     if seed:
@@ -65,7 +65,7 @@ def test_the_jaw_turns_to_the_needle_and_a_hand_takes_over() -> None:
     assert (page.simulation.state["arm"][0, page.arm]["setpoint_js"][0] == before[0]).all(), "nothing drives it"
 
 
-@pytest.mark.parametrize("turns", [40, 150])
+@pytest.mark.parametrize("turns", [40, pytest.param(150, marks=pytest.mark.slow)])
 def test_help_that_is_stopped_says_why_and_goes_on_with_the_next_press(turns: int) -> None:
     page = Page("needle_insertion", "PSM2")
     page.assist.begin("pick", page.arm, page.simulation.state[0])
