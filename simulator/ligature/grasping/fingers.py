@@ -114,7 +114,8 @@ class Fingers:
 
     def driven(self) -> bool:
         """Whether a command drives a finger; undriven fingers grasp nothing."""
-        return any(self._world.joints.driven(joint) for joint in self.jaw.joints)
+        driven, (one, other) = self._world.joints.driven, self.jaw.joints
+        return driven(one) or driven(other)
 
     def efforts(self) -> tuple[float, float]:
         """Efforts (N m) with which the commands of both fingers would close them; negative ones open."""

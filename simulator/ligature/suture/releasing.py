@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,13 @@ class Releases:
         Number of the joint, and the attachment, of each end that is attached.
     dt
         Length of a tick in seconds.
+
+    Attributes
+    ----------
+    off
+        Whether each end has come off.
+    possible
+        Whether an end that is on can come off.
     """
 
     def __init__(self, joints: Joints, ends: Sequence[tuple[int, Attachment]], dt: float) -> None:
@@ -34,11 +42,7 @@ class Releases:
         self._most = [attachment.release * dt**2 for _, attachment in ends]
         self._whole = [[array[j].copy() for array in self._rows()] for j, _ in ends]
         self.off = (False,) * len(self._ends)
-
-    @property
-    def possible(self) -> bool:
-        """Whether an end that is on can come off."""
-        return any(np.isfinite(most) and not off for most, off in zip(self._most, self.off, strict=True))
+        self.possible = self._remain()
 
     @property
     def bodies(self) -> list[int]:
@@ -53,11 +57,15 @@ class Releases:
     def set(self, off: tuple[bool, ...]) -> None:
         """Say which ends are off."""
         before, self.off = self.off, off
+        self.possible = self._remain()
         for (j, _), whole, was, now in zip(self._ends, self._whole, before, off, strict=True):
             if was != now:
                 parted = (APART, 0.0, 0.0, *FREE, 0.0)
                 for array, value, loose in zip((*self._rows(), self._joints.load), (*whole, 0.0), parted, strict=True):
                     array[j] = loose if now else value
+
+    def _remain(self) -> bool:
+        return any(isfinite(most) and not off for most, off in zip(self._most, self.off, strict=True))
 
     def _rows(self) -> tuple[Array, ...]:
         joints = self._joints
