@@ -49,14 +49,12 @@ class Coasting:
         return self._world.coasts
 
     def pass_ticks(self, ticks: int, begins: bool = False) -> tuple[int, int]:
-        """Advance by up to ``ticks``, with the same bits as single ticks; returns how many passed.
+        """Advance, where `begins` is true, by up to ``ticks`` with the bits of single ticks; returns how many passed.
 
         Returns also how far another one has begun, whose controllers have acted: 0 is not at all; after `SOLVED`
         grasps and bodies are to follow, else threads, too. Where it ``begins`` on purpose, that is so as a rule.
         """
         self.spent[:] = 0.0
-        if not self.begins:
-            return 0, 0
         self._suture.load_ahead()
         passed, begun, sound = self._coast(ticks if self.coasts else 0, begins)
         self._suture.conclude(passed, begun)

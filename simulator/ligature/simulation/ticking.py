@@ -69,13 +69,13 @@ class Ticking:
 
         In a tick commands become motor targets and forces, threads and grasps exchange impulses, bodies move.
         """
-        tick, coasting, step = self._clock.since_reset, self.coasting, self._subsystems.step
-        begins = not self._subsystems.resting and coasting.begins
-        free = _idle_ticks(self._after_bodies, tick, ticks) if begins and coasting.coasts else 0
-        idle = _idle_ticks(self._before_bodies, tick, min(free + 1, ticks)) if begins and ticks > 1 else 0
+        tick, step, idle = self._clock.since_reset, self._subsystems.step, 0
+        if ticks > 1:
+            begins, free = self._left_to_bodies(tick, ticks)
+            idle = _idle_ticks(self._before_bodies, tick, min(free + 1, ticks)) if begins else 0
         if not idle:
             step(self._leading)
-            free = min(free, _idle_ticks(self._after_bodies, tick, 1))  # what has stepped may drive a jaw
+            begins, free = self._left_to_bodies(tick, 1)  # what has stepped may drive a jaw
         most = min(free, idle or 1)
         begins = begins and self._begins and most < (idle or 1)
         passed, begun = self._coast(most, begins) if most or begins else (0, 0)
@@ -90,6 +90,13 @@ class Ticking:
         step(self._unsolved if begun == SOLVED else self._following if begun else self._controlled)
         self._clock.advance()
         return passed + 1
+
+    def _left_to_bodies(self, tick: int, most: int) -> tuple[bool, int]:
+        """Whether compiled code can begin the tick, and in how many only bodies and threads have work, at most."""
+        coasting = self.coasting
+        if self._subsystems.resting or not coasting.begins:
+            return False, 0
+        return True, _idle_ticks(self._after_bodies, tick, most) if coasting.coasts else 0
 
     def _coast(self, ticks: int, begins: bool) -> tuple[int, int]:
         """Advance by up to ``ticks`` in which only bodies and threads have work, in one call; returns how many.
