@@ -172,12 +172,14 @@ def run_arm_test(arm: Any) -> None:
     swing = np.zeros(len(start))
     swing[:2] = np.deg2rad(5.0)
     stream(lambda t: arm.servo_jp(start + swing * np.sin(np.pi * t) ** 2), 2.0, 100.0)
+    steady(arm.setpoint_jp)  # a command of the stream that comes after the move, on a topic of its own, would end it
     for sign in (1.0, -1.0, 0.0):
         goal = start + 2.0 * sign * swing
         assert arm.move_jp(goal).wait(), "a joint move did not end"
     at_rest(arm, start)
     tip = arm.setpoint_cp()
     stream(lambda t: arm.servo_cp(shifted(tip, 0.02 * np.sin(np.pi * t) ** 2 * np.array([1.0, 1.0, 0.0]))), 1.0, 100.0)
+    steady(arm.setpoint_cp)
     for axis in (0, 1):
         for way in (0.05, -0.05, 0.0):
             target = shifted(tip, way * np.eye(3)[axis])
