@@ -81,3 +81,15 @@ def later():
     assert absent(text) == [
         "tests.conftest.CORNER", "tests.nothing", "tests.nowhere", "ligature.tasks.knots.closed",
     ]  # fmt: skip
+
+
+def test_what_a_module_offers_to_all_is_there() -> None:
+    missing, lists = [], 0
+    for file in FILES:
+        for node in ast.parse(file.read_bytes()).body:
+            if not (isinstance(node, ast.Assign) and any(ast.unparse(target) == "__all__" for target in node.targets)):
+                continue
+            lists += 1
+            there, offered = defined(file), {n.value for n in ast.walk(node.value) if isinstance(n, ast.Constant)}
+            missing += [f"{file.relative_to(ROOT)}: {name}" for name in offered - there] if there is not None else []
+    assert lists > 20 and not missing, missing

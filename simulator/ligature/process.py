@@ -6,6 +6,7 @@ A process reports by lines on standard output: ``@event text``; everything else 
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import signal
 import sys
@@ -160,10 +161,9 @@ class Reported:
 
     def is_new(self, text: str, now: float) -> bool:
         """Whether ``text`` is to be reported at ``now`` (s, monotonic), which counts as done then."""
-        self._times = {text: at for text, at in self._times.items() if now - at < REPEAT}
-        if text in self._times:
+        if now - self._times.get(text, -math.inf) < REPEAT:
             return False
-        self._times[text] = now
+        self._times = {other: at for other, at in self._times.items() if now - at < REPEAT} | {text: now}
         return True
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from ligature.adf import Resolver, Severity, read_any
 from ligature.adf.writer import write_document
-from ligature.authoring.lint import OF_LOADING, RULES, Finding, lint
+from ligature.authoring.lint import OF_LOADING, READER, RULES, Finding, lint
 from ligature.authoring.objfile import Paint, Surface, obj_texts
 from ligature.authoring.shapes import Shape, shape_mesh
 from ligature.cli.main import app
@@ -212,7 +212,7 @@ def test_every_rule_has_a_seeded_fault() -> None:
 
 def test_the_command_names_each_finding_at_its_object_when_authors_ask(model) -> None:
     for _, changes in CASES:
-        found = [f for f in model(changes) if not f.rule.startswith("reader:") and f.rule not in OF_LOADING]
+        found = [f for f in model(changes) if not f.rule.startswith(READER) and f.rule not in OF_LOADING]
         lines = (model.folder / "m.yaml").read_text().splitlines()
         output = CliRunner().invoke(app, ["check", "--author", str(model.folder / "m.yaml")]).output
         for finding in found:

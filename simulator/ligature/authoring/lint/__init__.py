@@ -53,8 +53,8 @@ def _key_of(document: Document, message: str) -> str:
 
 
 __all__ = [
-    "ELSEWHERE",
     "OF_ALL_FILES",
+    "OF_LOADING",
     "READER",
     "RULES",
     "Finding",

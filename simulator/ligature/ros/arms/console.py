@@ -145,7 +145,8 @@ def _relay(publishers: Sequence[Any], content: Callable[[Any], Any]) -> Callable
 def _press(message: Any) -> Joy | None:
     """A button event of now: 1 pressed, 0 released, 2 clicked; None without a button, which clients cannot read."""
     if not message.buttons:
-        rospy.logwarn_throttle(REPEAT, "console: a pedal needs a button: send 'buttons: [1]' (pressed) or [0]")
+        needed = "send 'buttons: [1]' (pressed) or [0] (released)"
+        rospy.logwarn_throttle(REPEAT, f"console: a pedal needs a button: {needed}")
         return None
     event = Joy(buttons=list(message.buttons[:1]))
     event.header.stamp = rospy.Time.now()
