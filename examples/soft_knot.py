@@ -26,12 +26,13 @@ from ligature.environments.hand import SHUT, Hand
 from ligature.environments.knotting import BEYOND, SLOWEST, Knotter
 from ligature.environments.layout import ACTION
 from ligature.environments.reading import ArmReading
-from ligature.environments.tying import ACROSS, AWAY, DRAW, SLOW, Missed
+from ligature.environments.tying import ACROSS, AJAR, AWAY, DRAW, SLOW, Missed
 from ligature.model.frames import axis_rotation, frame
 from ligature.model.scene import Body, Scene
 from ligature.robots.psm_arm import PsmArm
 from ligature.tasks.diagrams import Diagram
 from ligature.tasks.knots import SQUARE_KNOT, extended
+from ligature.tasks.throws import drawn_back
 from ligature.tasks.wounds import CLOSED, Wound
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -73,23 +74,31 @@ OFFERED = np.array([0.005, 0.0255, -0.008])
 FAR = np.array([0.095, -0.008, 0.005]), np.array([-0.100, 0.022, 0.005])
 """Where the right and the left hand draw both ends: so far that a stretched end is taut before."""
 
-GIVEN, KEPT = np.array([0.020, 0.0, 0.005]), (0.15, 0.25)
-"""To where the right hand yields the long end while the short one slides; newtons between which it keeps it."""
+GIVEN, KEPT = np.array([0.020, 0.0, 0.005]), (0.03, 0.08)
+"""To where the right hand yields the long end while the short one slides; newtons between which it keeps it: with more
+the throws grip the short end, which then draws the whole knot aside instead of sliding through it."""
 
-SNUG, HARDER, MEETING = 3.0, 1.5, 5e-5
-"""Newtons with which the short end is drawn until the lips meet, and how many more each further time: what is too
-short springs back when the ends are slack; width of the wound where the lips meet."""
+SNUG, HARDEST, MEETING = 3.0, 9.0, 5e-5
+"""Newtons with which the short end is drawn until the lips meet, as many more each further time up to the hardest: what
+is too short springs back when the ends are slack; width of the wound where the lips meet."""
 
-EASED = np.array([0.030, 0.0, 0.008]), np.array([-0.028, 0.014, 0.005])
+EASED = np.array([0.020, 0.0, 0.008]), np.array([-0.016, 0.010, 0.008])
 """Towards where the right and the left hand ease their ends."""
 
 SLACK, EVEN, LOOSE = 0.005, 0.8, 60
 """Newtons below which an end is slack: 0.05 still hold a knot shut that opens in no hand. Share of the other end's
 tension above which a hand eases its own; actions by which both hands go on once both ends are slack."""
 
-TIMES, TWICE, MOST = 8, 2, 300
-"""How often the knot is slid and locked at most, how often in turn it must hold, and actions of a slide, of a lock and
-of easing at most."""
+FROM = 5
+"""Elements from a jaw from which on the tension is that of the thread: the jaw keeps what it held stretched so."""
+
+TIMES, LOOKS, MOST = 8, 4, 300
+"""How often the knot is slid and locked at most before the hands let go, and how often they do that; actions of a
+slide, of a lock and of easing at most."""
+
+ENDED, OFF = (19, 15), 0.03
+"""Elements from the end of the thread at which the left and the right hand take their end again; metres by which a hand
+goes back before."""
 
 DISPLACED = np.array([-0.0015, 0.0010, 0.0])
 """Where the first throw then lies, from where it would lie at the vessel."""
@@ -124,6 +133,14 @@ class Sewn(Ligating):
     def gap(self) -> float:
         """Width of the wound at the stitch."""
         return self.wound.gap(self._simulation.state[0], 0.0)
+
+    def pull(self, arm: int) -> float:
+        """As ever, further from the jaws."""
+        held = self.held(arm)
+        if held is None:
+            return 0.0
+        first = held - FROM - 5 if held > self.beside(self.points()) else held + FROM
+        return float(self.tension()[max(first, 0) :][:6].max())
 
     def beside(self, points: Array) -> int:
         """The element at which the short end comes out of the tissue."""
@@ -190,16 +207,29 @@ class Knotting(Knotter):
         return pull > TAUT and length < CLOSE
 
     def draw_apart(self) -> Iterator[Array]:
-        """Slide and lock the knot until it has held the wound closed by itself twice, both ends slack in the hands."""
-        goal, held = self.goal, 0
+        """Slide and lock the knot until it holds the wound closed by itself, both ends slack in the hands.
+
+        An end that is lost is taken again.
+        """
+        goal = self.goal
         assert isinstance(goal, Sewn)
         for count in range(TIMES):
-            yield from self.slide(goal, min(SNUG + count * HARDER, self.LOCKED))
-            yield from self.lock()
-            yield from self.ease()
-            held = held + 1 if goal.gap() < MEETING and self.slack() else 0  # taut ends would keep the lips shut
-            if held == TWICE:
+            try:
+                yield from self.slide(goal, min((count + 1) * SNUG, HARDEST))
+                yield from self.lock()
+                yield from self.ease()
+            except Missed:
+                yield from self.take_ends()
+                continue
+            if goal.gap() < MEETING and self.slack():  # taut ends would keep the lips shut
                 return
+
+    def take_ends(self) -> Iterator[Array]:
+        """Each hand that holds no end takes its own again, where that lies."""
+        for number, element in ((LEFT, ENDED[0]), (RIGHT, len(self.goal.elements) - ENDED[1])):
+            if self.goal.held(number) is None:
+                yield from self.go(number, drawn_back(self.hands[number].tool, OFF), AJAR, SLOW)
+                yield from self.take(number, self.hands[number].tool[:3, 2], element)
 
     def slide(self, goal: Sewn, most: float) -> Iterator[Array]:
         """The left hand draws the short end, while the right one keeps the long end just taut: the knot does not lock.
@@ -356,6 +386,23 @@ def begun(simulation: ligature.Simulation, seed: int) -> Sewn:
     return goal
 
 
+def lock_knot(theatre: Theatre, knotter: Knotting) -> tuple[float, float]:
+    """Draw both ends, let go, and look: where the wound opens the hands take both ends again.
+
+    Returns the width of the wound with both ends slack, and when the hands have let go.
+    """
+    goal = theatre.goal
+    for look in range(LOOKS):
+        theatre.run(knotter.draw_apart())
+        eased = goal.gap()
+        theatre.run(knotter.let_go())
+        free = goal.gap()
+        if free < MEETING or look == LOOKS - 1:
+            break
+        theatre.run(knotter.take_ends())
+    return eased, free
+
+
 def make_knot(theatre: Theatre) -> tuple[list[float], str]:
     """Make the knot, let go, wait; returns the gaps of `Outcome`, and why it stopped, if it did."""
     env: Any = theatre
@@ -364,11 +411,9 @@ def make_knot(theatre: Theatre) -> tuple[list[float], str]:
     try:
         theatre.run(knotter.first())
         goal.vessel = goal.vessel + DISPLACED
-        for step in (knotter.second, knotter.draw_second, knotter.take_short_end, knotter.draw_apart):
+        for step in (knotter.second, knotter.draw_second, knotter.take_short_end):
             theatre.run(step())
-        gaps.append(goal.gap())
-        theatre.run(knotter.let_go())
-        gaps.append(goal.gap())
+        gaps += lock_knot(theatre, knotter)
         theatre.wait(HOLDS)
     except (Missed, ValueError) as error:
         stopped = str(error)
