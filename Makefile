@@ -122,7 +122,7 @@ curves: developers
 # LeRobot's own reader on exports, in an environment of its own: numpy 2, torch, Python 3.12; 5.4 GB
 LEROBOT := build/lerobot
 lerobot-reader: developers
-	@test -x $(LEROBOT)/bin/python || command -v python3.12 >/dev/null || { echo "LeRobot needs Python 3.12; install python3.12"; exit 1; }
+	@test -x $(LEROBOT)/bin/python || python3.12 --version >/dev/null 2>&1 || { echo "LeRobot needs Python 3.12; install python3.12"; exit 1; }
 	@test -x $(LEROBOT)/bin/lerobot-info || { python3.12 -m venv $(LEROBOT) && $(STEP) "installing LeRobot, 5.4 GB, some minutes" \
 		$(LEROBOT)/bin/pip --disable-pip-version-check install --progress-bar off 'lerobot[dataset]==0.6.1'; }
 	$(PYTHON) -m pytest tests/datasets/test_lerobot_reader.py
