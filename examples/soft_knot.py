@@ -21,7 +21,7 @@ from typing import Any
 import ligature
 import numpy as np
 from ligature.environments.actions import ArmActions
-from ligature.environments.goals.ligating import LEFT, RIGHT, Ligating, holding
+from ligature.environments.goals.ligating import DEEP, LEFT, RIGHT, Ligating, holding
 from ligature.environments.hand import SHUT, Hand
 from ligature.environments.knotting import BEYOND, SLOWEST, Knotter
 from ligature.environments.layout import ACTION
@@ -96,9 +96,8 @@ TIMES, LOOKS, MOST = 8, 4, 300
 """How often the knot is slid and locked at most before the hands let go, and how often they do that; actions of a
 slide, of a lock and of easing at most."""
 
-ENDED, OFF = (19, 15), 0.03
-"""Elements from the end of the thread at which the left and the right hand take their end again; metres by which a hand
-goes back before."""
+TAKEN, OFF = ((15, 35), (-45, -15)), 0.03
+"""Elements between which the left and the right hand take their end again; metres by which a hand goes back before."""
 
 DISPLACED = np.array([-0.0015, 0.0010, 0.0])
 """Where the first throw then lies, from where it would lie at the vessel."""
@@ -225,11 +224,26 @@ class Knotting(Knotter):
                 return
 
     def take_ends(self) -> Iterator[Array]:
-        """Each hand that holds no end takes its own again, where that lies."""
-        for number, element in ((LEFT, ENDED[0]), (RIGHT, len(self.goal.elements) - ENDED[1])):
+        """Each hand that holds no end takes its own again, where that lies; a missed one is tried again."""
+        for number, step in ((LEFT, self.take_short), (RIGHT, self.take_long)):
             if self.goal.held(number) is None:
-                yield from self.go(number, drawn_back(self.hands[number].tool, OFF), AJAR, SLOW)
-                yield from self.take(number, self.hands[number].tool[:3, 2], element)
+                yield from self.tries(number, step)
+
+    def take_short(self) -> Iterator[Array]:
+        """The left hand takes the short end where it lies."""
+        yield from self.take_nearest(LEFT, *TAKEN[0])
+
+    def take_long(self) -> Iterator[Array]:
+        """The right hand takes the long end where it lies."""
+        yield from self.take_nearest(RIGHT, *TAKEN[1])
+
+    def take_nearest(self, number: int, first: int, last: int) -> Iterator[Array]:
+        """A hand goes back, and takes, turned as it is, what is nearest of some elements of the thread."""
+        T, points = self.hands[number].tool, self.goal.points()
+        among = np.arange(len(points))[first:last]
+        away = np.linalg.norm(points[among] - (T[:3, 3] + DEEP * T[:3, 2]), axis=1)
+        yield from self.go(number, drawn_back(T, OFF), AJAR, SLOW)
+        yield from self.take(number, T[:3, 2], int(among[away.argmin()]))
 
     def slide(self, goal: Sewn, most: float) -> Iterator[Array]:
         """The left hand draws the short end, while the right one keeps the long end just taut: the knot does not lock.

@@ -7,7 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import ligature
+import numpy as np
 import pytest
+from ligature.environments.hand import SHUT, Hand
+from ligature.environments.tying import WRONG
 from ligature.tasks.knots import SQUARE_KNOT
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -25,6 +28,23 @@ def test_a_knot_counts_where_it_is_square_and_holds_the_wound_closed_by_itself()
         {"kind": granny}, {"gaps": slips}, {"gaps": gapes}, {"sewn": False}, {"hands_empty": False}, {"stopped": "lost"}
     ):  # fmt: skip
         assert not replace(GOOD, **bad).success
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_hand_that_lost_its_end_takes_it_again(seed: int) -> None:
+    simulation = ligature.Simulation(ligature.load(soft_knot.SCENE))
+    goal = soft_knot.begun(simulation, seed)
+    theatre = soft_knot.Theatre(simulation, goal)
+    knotter = soft_knot.Knotting(Hand(theatre, 0))
+    aside = np.append(np.random.default_rng(seed).uniform(-0.01, 0.01, 2), 0.01)
+    theatre.run(knotter.go(soft_knot.RIGHT, knotter.moved(soft_knot.RIGHT, *aside), SHUT))
+    theatre.run(knotter.leave(soft_knot.RIGHT))
+    theatre.wait(1.0)
+    assert goal.held(soft_knot.RIGHT) is None
+    theatre.run(knotter.tries(soft_knot.RIGHT, knotter.take_long))
+    held = goal.held(soft_knot.RIGHT)
+    first, last = soft_knot.TAKEN[1]
+    assert held is not None and first - WRONG <= held - len(goal.elements) < last + WRONG
 
 
 @pytest.mark.slow
