@@ -4,9 +4,9 @@ In the scene `soft_knot` a thread is already stitched through both lips of a wou
 The program makes the throws of the expert of `ligature/KnotTie-v0`, with other places: the first throw is drawn just
 until it lies on the tissue, since one that is drawn hard locks too far above it; the second throw stays loose, so that
 the short end slides through both until the wound is closed; then both ends drawn apart lock the knot. The hands ease
-both ends and look: where the wound opens again, they slide and lock the knot once more. The program finds its way by
-the ground truth of the simulation. Run it with ``--help``. World axes, metres, radians, newtons, seconds of simulated
-time.
+both ends and look, let go and look again: where the wound opens, they slide and lock the knot once more. The program
+finds its way by the ground truth of the simulation. Run it with ``--help``. World axes, metres, radians, newtons,
+seconds of simulated time.
 """
 
 from __future__ import annotations
@@ -76,10 +76,10 @@ FAR = np.array([0.095, -0.008, 0.005]), np.array([-0.100, 0.022, 0.005])
 
 GIVEN, KEPT = np.array([0.020, 0.0, 0.005]), (0.03, 0.08)
 """To where the right hand yields the long end while the short one slides; newtons between which it keeps it: with more
-the throws grip the short end, which then draws the whole knot aside instead of sliding through it."""
+the throws hold the short end, which then draws the whole knot aside instead of sliding through it."""
 
-SNUG, HARDEST, MEETING = 3.0, 9.0, 5e-5
-"""Newtons with which the short end is drawn until the lips meet, as many more each further time up to the hardest: what
+SNUG, UTMOST, MEETING = 3.0, 9.0, 5e-5
+"""Newtons with which the short end is drawn until the lips meet, as many more each further time, and at most: what
 is too short springs back when the ends are slack; width of the wound where the lips meet."""
 
 EASED = np.array([0.020, 0.0, 0.008]), np.array([-0.016, 0.010, 0.008])
@@ -214,7 +214,7 @@ class Knotting(Knotter):
         assert isinstance(goal, Sewn)
         for count in range(TIMES):
             try:
-                yield from self.slide(goal, min((count + 1) * SNUG, HARDEST))
+                yield from self.slide(goal, min((count + 1) * SNUG, UTMOST))
                 yield from self.lock()
                 yield from self.ease()
             except Missed:
@@ -224,17 +224,17 @@ class Knotting(Knotter):
                 return
 
     def take_ends(self) -> Iterator[Array]:
-        """Each hand that holds no end takes its own again, where that lies; a missed one is tried again."""
+        """Each hand that holds no end takes its own again, where that is; a missed one is tried again."""
         for number, step in ((LEFT, self.take_short), (RIGHT, self.take_long)):
             if self.goal.held(number) is None:
                 yield from self.tries(number, step)
 
     def take_short(self) -> Iterator[Array]:
-        """The left hand takes the short end where it lies."""
+        """The left hand takes the short end where that is."""
         yield from self.take_nearest(LEFT, *TAKEN[0])
 
     def take_long(self) -> Iterator[Array]:
-        """The right hand takes the long end where it lies."""
+        """The right hand takes the long end where that is."""
         yield from self.take_nearest(RIGHT, *TAKEN[1])
 
     def take_nearest(self, number: int, first: int, last: int) -> Iterator[Array]:
