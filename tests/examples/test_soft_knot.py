@@ -36,6 +36,7 @@ def test_a_hand_that_lost_its_end_takes_it_again(seed: int) -> None:
     goal = soft_knot.begun(simulation, seed)
     theatre = soft_knot.Theatre(simulation, goal)
     knotter = soft_knot.Knotting(Hand(theatre, 0))
+    assert knotter.beyond(soft_knot.RIGHT, len(goal.elements)) == len(goal.elements) - 1  # a hand may hold its very end
     aside = np.append(np.random.default_rng(seed).uniform(-0.01, 0.01, 2), 0.01)
     theatre.run(knotter.go(soft_knot.RIGHT, knotter.moved(soft_knot.RIGHT, *aside), SHUT))
     theatre.run(knotter.leave(soft_knot.RIGHT))

@@ -152,8 +152,8 @@ class Tier:
         return held
 
     def beyond(self, number: int, ahead: int) -> int:
-        """The element, ``ahead`` or more from a hand, at which the other one takes the thread."""
-        return self.end(number) + ahead + self.further
+        """The element, ``ahead`` or more from a hand, at which the other one takes the thread: the last one at most."""
+        return min(self.end(number) + ahead + self.further, len(self.goal.elements) - 1)
 
     def pull(self, number: int) -> float:
         """Tension of the thread beside a hand; raises `Missed` when it holds none."""
