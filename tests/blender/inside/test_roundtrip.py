@@ -1,5 +1,6 @@
 """What is brought in and written back unchanged is the same file, byte for byte; a change is one line."""
 
+import json
 import os
 import time
 from pathlib import Path
@@ -107,9 +108,16 @@ def pose_error(done):
     return max(errors)
 
 
-def test_the_phantom_opens_in_a_second_and_is_written_in_another(corpus, tmp_path):
-    file = next(corpus.rglob("Simple/phantom.yaml"))
+def reference():
+    """Processor seconds of Python's own work, half as many as a phantom takes on any machine, however busy."""
     start = time.process_time()
+    json.loads(json.dumps([{"index": i, "place": [0.5 * i, float(i), 2.0 * i]} for i in range(50_000)], indent=1))
+    return time.process_time() - start
+
+
+def test_the_phantom_opens_and_is_written_within_seconds(corpus, tmp_path):
+    file = next(corpus.rglob("Simple/phantom.yaml"))
+    before, start = reference(), time.process_time()
     done = import_file(file, bpy.context.scene)
     bpy.context.view_layer.update()
     opened = time.process_time() - start
@@ -117,8 +125,8 @@ def test_the_phantom_opens_in_a_second_and_is_written_in_another(corpus, tmp_pat
     export_file(done.collection, tmp_path / "phantom.yaml")
     written = time.process_time() - start
     assert (tmp_path / "phantom.yaml").read_bytes() == file.read_bytes()
-    # processor seconds, far above the found ones (docs/blender.md) since a busy machine lengthens them
-    assert opened < 3.0 and written < 3.0, (opened, written)
+    unit = max(before, reference())
+    assert opened < 6.0 * unit and written < 6.0 * unit, (opened, written, unit)
 
 
 def test_references_to_other_files_are_kept_and_resolved_when_those_are_open(corpus):
