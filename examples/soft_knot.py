@@ -4,9 +4,9 @@ In the scene `soft_knot` a thread is already stitched through both lips of a wou
 The program makes the throws of the expert of `ligature/KnotTie-v0`, with other places: the first throw is drawn just
 until it lies on the tissue, since one that is drawn hard locks too far above it; the second throw stays loose, so that
 the short end slides through both until the wound is closed; then both ends drawn apart lock the knot. The hands ease
-both ends and look, let go and look again: where the wound opens, they slide and lock the knot once more. The program
-finds its way by the ground truth of the simulation. Run it with ``--help``. World axes, metres, radians, newtons,
-seconds of simulated time.
+both ends and look, let go and watch: where the wound opens, they slide and lock the knot once more. The program finds
+its way by the ground truth of the simulation. Run it with ``--help``. World axes, metres, radians, newtons, seconds of
+simulated time.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -96,8 +97,8 @@ TIMES, LOOKS, MOST = 8, 4, 300
 """How often the knot is slid and locked at most before the hands let go, and how often they do that; actions of a
 slide, of a lock and of easing at most."""
 
-TAKEN, OFF = ((15, 35), (-45, -15)), 0.03
-"""Elements between which the left and the right hand take their end again; metres by which a hand goes back before."""
+SHORT_END, LONG_END, OFF = slice(15, 35), slice(-45, -15), 0.03
+"""Elements between which a hand takes an end again that it has lost; metres by which it goes back before."""
 
 DISPLACED = np.array([-0.0015, 0.0010, 0.0])
 """Where the first throw then lies, from where it would lie at the vessel."""
@@ -193,6 +194,18 @@ class Knotting(Knotter):
         away = self.goal.vessel + OFFERED - self.goal.points()[self.beyond(LEFT, BEYOND)]
         yield from self.go(LEFT, self.moved(LEFT, *away), SHUT, SLOW)
 
+    def second(self) -> Iterator[Array]:
+        """As ever; before each try the left hand takes the long end again if it has lost it."""
+        yield from self.tries(RIGHT, partial(self.regain, LEFT, LONG_END), self.hook, self.under, self.back_through)
+
+    def draw_second(self) -> Iterator[Array]:
+        """As ever; the right hand takes the long end again if it has lost it."""
+        yield from self.tries(RIGHT, partial(self.regain, RIGHT, LONG_END), super().draw_second)
+
+    def take_short_end(self) -> Iterator[Array]:
+        """As ever; a short end that is missed or lost is taken again, and so is the long end."""
+        yield from self.tries(LEFT, partial(self.regain, RIGHT, LONG_END), super().take_short_end)
+
     def draw(self) -> Iterator[Array]:
         """The left hand draws the first throw until it lies on the tissue, and no further."""
         for place in DRAWN:
@@ -225,25 +238,23 @@ class Knotting(Knotter):
 
     def take_ends(self) -> Iterator[Array]:
         """Each hand that holds no end takes its own again, where that is; a missed one is tried again."""
-        for number, step in ((LEFT, self.take_short), (RIGHT, self.take_long)):
-            if self.goal.held(number) is None:
-                yield from self.tries(number, step)
+        for number, among in ((LEFT, SHORT_END), (RIGHT, LONG_END)):
+            yield from self.tries(number, partial(self.regain, number, among))
 
-    def take_short(self) -> Iterator[Array]:
-        """The left hand takes the short end where that is."""
-        yield from self.take_nearest(LEFT, *TAKEN[0])
+    def regain(self, number: int, among: slice) -> Iterator[Array]:
+        """A hand that holds nothing goes back, and takes, turned as it is, what is nearest of some elements.
 
-    def take_long(self) -> Iterator[Array]:
-        """The right hand takes the long end where that is."""
-        yield from self.take_nearest(RIGHT, *TAKEN[1])
-
-    def take_nearest(self, number: int, first: int, last: int) -> Iterator[Array]:
-        """A hand goes back, and takes, turned as it is, what is nearest of some elements of the thread."""
+        Where it missed that, it takes what is also near to being aligned with its jaws: wrists turn only so far.
+        """
+        if self.goal.held(number) is not None:
+            return
         T, points = self.hands[number].tool, self.goal.points()
-        among = np.arange(len(points))[first:last]
-        away = np.linalg.norm(points[among] - (T[:3, 3] + DEEP * T[:3, 2]), axis=1)
+        elements, tangents = np.arange(len(points))[among], np.gradient(points, axis=0)[among]
+        away = np.linalg.norm(points[elements] - (T[:3, 3] + DEEP * T[:3, 2]), axis=1)
+        aligned = np.abs(tangents @ T[:3, 0]) / np.linalg.norm(tangents, axis=1)
+        cost = away / np.maximum(aligned, 0.05) ** (2 * self.further // self.FURTHER)
         yield from self.go(number, drawn_back(T, OFF), AJAR, SLOW)
-        yield from self.take(number, T[:3, 2], int(among[away.argmin()]))
+        yield from self.take(number, T[:3, 2], int(elements[cost.argmin()]))
 
     def slide(self, goal: Sewn, most: float) -> Iterator[Array]:
         """The left hand draws the short end, while the right one keeps the long end just taut: the knot does not lock.
@@ -318,11 +329,14 @@ class Theatre:
             self.simulation.step(CONTROL)
             self._watch()
 
-    def wait(self, seconds: float) -> None:
-        """Go on for so many seconds."""
+    def wait(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
+        """Go on for so many seconds, or until something is so; returns whether it was."""
         for _ in range(round(seconds / (CONTROL * self.simulation.dt))):
+            if until():
+                return True
             self.simulation.step(CONTROL)
             self._watch()
+        return until()
 
 
 @dataclass(frozen=True)
@@ -400,21 +414,21 @@ def begun(simulation: ligature.Simulation, seed: int) -> Sewn:
     return goal
 
 
-def lock_knot(theatre: Theatre, knotter: Knotting) -> tuple[float, float]:
-    """Draw both ends, let go, and look: where the wound opens the hands take both ends again.
+def lock_knot(theatre: Theatre, knotter: Knotting) -> list[float]:
+    """Draw both ends, let go, and watch for `HOLDS` seconds: once the wound opens the hands take both ends again.
 
-    Returns the width of the wound with both ends slack, and when the hands have let go.
+    Returns the width of the wound with both ends slack, when the hands have let go, and `HOLDS` seconds later.
     """
     goal = theatre.goal
     for look in range(LOOKS):
         theatre.run(knotter.draw_apart())
         eased = goal.gap()
         theatre.run(knotter.let_go())
-        free = goal.gap()
-        if free < MEETING or look == LOOKS - 1:
+        free, more = goal.gap(), look < LOOKS - 1
+        if not theatre.wait(HOLDS, lambda more=more: more and goal.gap() >= MEETING):  # type: ignore[misc]
             break
         theatre.run(knotter.take_ends())
-    return eased, free
+    return [eased, free, goal.gap()]
 
 
 def make_knot(theatre: Theatre) -> tuple[list[float], str]:
@@ -428,10 +442,9 @@ def make_knot(theatre: Theatre) -> tuple[list[float], str]:
         for step in (knotter.second, knotter.draw_second, knotter.take_short_end):
             theatre.run(step())
         gaps += lock_knot(theatre, knotter)
-        theatre.wait(HOLDS)
     except (Missed, ValueError) as error:
         stopped = str(error)
-    gaps.append(goal.gap())
+        gaps.append(goal.gap())
     return gaps, stopped
 
 

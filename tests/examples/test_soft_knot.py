@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import ligature
@@ -42,10 +43,21 @@ def test_a_hand_that_lost_its_end_takes_it_again(seed: int) -> None:
     theatre.run(knotter.leave(soft_knot.RIGHT))
     theatre.wait(1.0)
     assert goal.held(soft_knot.RIGHT) is None
-    theatre.run(knotter.tries(soft_knot.RIGHT, knotter.take_long))
+    theatre.run(knotter.tries(soft_knot.RIGHT, partial(knotter.regain, soft_knot.RIGHT, soft_knot.LONG_END)))
     held = goal.held(soft_knot.RIGHT)
-    first, last = soft_knot.TAKEN[1]
-    assert held is not None and first - WRONG <= held - len(goal.elements) < last + WRONG
+    first, last, _ = soft_knot.LONG_END.indices(len(goal.elements))
+    assert held is not None and first - WRONG <= held < last + WRONG
+    theatre.run(knotter.regain(soft_knot.RIGHT, soft_knot.LONG_END))
+    assert goal.held(soft_knot.RIGHT) == held  # it holds it
+
+
+def test_it_waits_until_something_is_so_and_states_whether_it_was() -> None:
+    simulation = ligature.Simulation(ligature.load(soft_knot.SCENE))
+    theatre = soft_knot.Theatre(simulation, soft_knot.begun(simulation, 0))
+    begin = simulation.time
+    assert theatre.wait(1.0, lambda: simulation.time > begin + 0.1)
+    assert begin + 0.1 < simulation.time <= begin + 0.1 + 1.5 * soft_knot.CONTROL * simulation.dt
+    assert not theatre.wait(0.1) and simulation.time > begin + 0.19
 
 
 @pytest.mark.slow
