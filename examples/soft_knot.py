@@ -159,7 +159,7 @@ class Knotting(Knotter):
     """Both hands, and the thread, over soft tissue: that bends the free end, so they look where it is."""
 
     UP, LOCKED, TIGHT = np.array([-0.031, 0.047, 0.039]), 10.0, 0.1
-    FURTHER = 5
+    FURTHER, TRIES = 5, 6
     BROUGHT = (*Knotter.BROUGHT[:3], (0.0015, 0.0080, -0.010, ACROSS))
     IN, SHARE = 0.012, 0.45
     """Taken so near, and through the loop so far from the tissue, that the left tool does not lean over the pad; of a
@@ -197,6 +197,13 @@ class Knotting(Knotter):
     def second(self) -> Iterator[Array]:
         """As ever; before each try the left hand takes the long end again if it has lost it."""
         yield from self.tries(RIGHT, partial(self.regain, LEFT, LONG_END), self.hook, self.under, self.back_through)
+
+    def back_through(self) -> Iterator[Array]:
+        """As ever; broken off where no hand holds the long end, while that is still near to the left one."""
+        for action in super().back_through():
+            if self.goal.held(LEFT) is None and self.goal.held(RIGHT) is None:
+                raise Missed("the left hand lost the thread")
+            yield action
 
     def draw_second(self) -> Iterator[Array]:
         """As ever; the right hand takes the long end again if it has lost it."""

@@ -42,9 +42,6 @@ APPROACH = ((0.052, 1.0), (0.026, 1.0), (0.010, 0.6))
 DRAWN = ((-0.016, -0.002, 0.014, 0.25), (-0.066, -0.020, 0.020, 1.2))
 """Where the left hand draws the throw, one place after the other, from the vessel, and newtons with which it stops."""
 
-TRIES = 3
-"""How often a hand tries to take the thread from the other one at most."""
-
 WRONG = 4
 """Elements from the one that it was to take at which a hand has taken another strand."""
 
@@ -86,7 +83,10 @@ class Tier:
     """How far from the vessel the left tool reaches down through the loop."""
 
     FURTHER = 0
-    """Elements by which a hand takes the thread further from the other one each time that it missed it."""
+    """Elements by which a hand takes the thread further from the other one each time, of three, that it missed it."""
+
+    TRIES = 3
+    """How often a hand tries to take the thread from the other one at most."""
 
     further = 0
 
@@ -102,14 +102,14 @@ class Tier:
 
     def tries(self, number: int, *steps: Callable[[], Iterator[Array]]) -> Iterator[Array]:
         """Steps at whose end a hand takes the thread from the other one; where it missed that, they are made again."""
-        for count in range(TRIES):
-            self.further = count * self.FURTHER
+        for count in range(self.TRIES):
+            self.further = count % 3 * self.FURTHER
             try:
                 for step in steps:
                     yield from step()
                 return
             except Missed:
-                if count == TRIES - 1:
+                if count == self.TRIES - 1:
                     raise
                 yield from self.leave(number)
 
