@@ -127,6 +127,24 @@ def test_a_seeded_fault_is_found_by_its_rule(model, name: str, changes: dict[str
     assert found[0].message and (found[0].hint or name.startswith("reader"))
 
 
+@pytest.mark.parametrize("elements", [3, 4, 6])
+@pytest.mark.parametrize("opted_out", ["", "body", "file"])
+def test_a_needle_on_a_thread_may_weigh_what_it_likes(model, elements: int, opted_out: str) -> None:
+    """The solver of a thread does not iterate over its joints; a chain that stays bodies is warned about."""
+    names = [f"BODY t{n}" for n in range(elements)]
+    body = {"mass": 1e-4, "collision shape": "CAPSULE", "collision geometry": {"radius": 0.001, "height": 0.01}}
+    spring = {"type": "six dof spring", "joint limits": SIX, "stiffness": {"linear": ZERO, "angular": UP}}
+    ends = {"parent pivot": ZERO, "child pivot": ZERO, "parent axis": UP, "child axis": UP}
+    changes: dict[str, Any] = {"bodies": ["BODY a", "BODY b", *names], "BODY b/mass": 1.0}
+    joints = {"JOINT tail": ("BODY b", names[0])} | {f"JOINT s{n}": names[n : n + 2] for n in range(elements - 1)}
+    changes |= {name: {"name": name[5:], **body} for name in names}
+    changes |= {key: {"name": key[6:], "parent": p, "child": c, **spring, **ends} for key, (p, c) in joints.items()}
+    changes["joints"] = ["JOINT j", *joints]
+    changes |= {"": {}, "body": {f"{names[1]}/ligature rod": False}, "file": {"ligature rod": False}}[opted_out]
+    found = [finding.key for finding in model(changes) if finding.rule == "mass-ratio"]
+    assert found == ([] if elements >= 4 and not opted_out else ["JOINT tail"])
+
+
 @pytest.mark.parametrize("scale", [0.01, 50.0])
 def test_a_mesh_counts_as_large_as_its_scale_makes_it(model, scale: float) -> None:
     for folder, name, size in (("high", "a.obj", 0.1), ("low", "a_hull.obj", 0.09)):

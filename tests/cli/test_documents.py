@@ -103,6 +103,23 @@ def test_inertia_of_tissue_is_that_of_what_it_fills(tmp_path: Path, shapes: str,
     assert volume in run("inertia", tmp_path / "m.yaml")
 
 
+@pytest.mark.parametrize(
+    ("tissue", "options", "density"),
+    [
+        ("material: liver", (), 1060.0),
+        ("material: liver, density: 1200", (), 1200.0),
+        ("youngs modulus: 1000", (), 1000.0),
+        ("material: liver", ("--density", 500.0), 500.0),
+    ],
+)
+def test_tissue_without_mass_has_that_of_its_density(
+    tmp_path: Path, tissue: str, options: tuple[object, ...], density: float
+) -> None:
+    shape = "shape: BOX, geometry: {x: 0.1, y: 0.1, z: 0.1}"
+    (tmp_path / "m.yaml").write_text(f"bodies: [P]\nP: {{name: p, mass: 0, {shape}, ligature tissue: {{{tissue}}}}}\n")
+    assert f"P: mass {density / 1000:g} kg, volume 0.001 m³" in run("inertia", tmp_path / "m.yaml", *options)
+
+
 def test_what_no_robot_holds_is_reported(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(
         "bodies: [A, B, P]\njoints: [J]\nghost objects: [G]\nsutures: [S]\nsoft bodies: [Q, R]\nsensors: [X]\n"

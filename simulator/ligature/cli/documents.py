@@ -17,8 +17,12 @@ from ligature.authoring.shapes import shapes_properties
 from ligature.mesh.inertia import MassProperties, mass_properties
 from ligature.mesh.load import EXTENSIONS, load_mesh
 from ligature.mesh.surface import joined
+from ligature.model.material import MATERIALS
 from ligature.paths import real_path
 from ligature.process import signals_held
+
+DENSITY = 1000.0
+"""kg/m³ of what states neither mass nor density."""
 
 
 def fmt(files: Sequence[Path], check: bool, lossy: bool, console: Console) -> int:
@@ -103,12 +107,15 @@ def _shown(value: object) -> str:
     return "default" if value is None else str(value)
 
 
-def inertia(file: Path, density: float, mass: float | None, console: Console) -> int:
-    """Print the mass properties of a mesh file, or of every body of a model; returns the exit status."""
+def inertia(file: Path, density: float | None, mass: float | None, console: Console) -> int:
+    """Print the mass properties of a mesh file, or of every body of a model; returns the exit status.
+
+    A body without mass has ``density``, by default that of its tissue or else `DENSITY`.
+    """
     resolver = Resolver.for_file(file)
     if file.suffix.lower() in EXTENSIONS:
         try:
-            solid = mass_properties(*joined(load_mesh(real_path(file), resolver).parts), density)
+            solid = mass_properties(*joined(load_mesh(real_path(file), resolver).parts), density or DENSITY)
         except AdfError as error:
             console.print(str(error), style="red", markup=False)
             return 1
@@ -134,8 +141,17 @@ def inertia(file: Path, density: float, mass: float | None, console: Console) ->
             console.print(f"{body.key}: {error}", markup=False)
             continue
         weight = body.number("mass") if mass is None else mass
-        _print_solid(body.key, solid.with_mass(weight or density * solid.volume), console)
+        weight = weight or (density or _tissue_density(body) or DENSITY) * solid.volume
+        _print_solid(body.key, solid.with_mass(weight), console)
     return 0
+
+
+def _tissue_density(body: Element) -> float | None:
+    """The density in kg/m³ that a body states for its tissue as a whole; None where it states none."""
+    if body.has("ligature tissue.density"):
+        return body.number("ligature tissue.density")
+    material = MATERIALS.get(body.text("ligature tissue.material")) if body.has("ligature tissue.material") else None
+    return None if material is None else material.density
 
 
 def _solid(subject: Subject, body: Element) -> MassProperties:

@@ -282,7 +282,10 @@ def diff(before: Path, after: Path) -> None:
 @app.command()
 def inertia(
     file: Annotated[Path, typer.Argument(help="A mesh, or a model file.")],
-    density: Annotated[float, typer.Option(help="In kg/m³.", min=1e-9)] = 1000.0,
+    density: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(help="In kg/m³, where no mass is stated; default: that of the tissue, else 1000.", min=1e-9),
+    ] = None,
     mass: Annotated[Optional[float], typer.Option(help="In kg, instead of the density.", min=1e-12)] = None,  # noqa: UP045
 ) -> None:
     """Mass, centre of mass and principal moments of a mesh, or of the bodies of a model, as ADF keys."""

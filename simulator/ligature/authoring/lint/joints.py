@@ -13,6 +13,9 @@ from ligature.authoring.lint.subject import Finding, Subject, rule
 from ligature.authoring.placement import matrix_of
 
 MASS_RATIO = 100.0
+LEAST_ELEMENTS = 4
+"""Bodies from which a chain is a thread."""
+
 RESIDUAL_M, RESIDUAL_RAD = 1e-3, 5e-3
 """Allowed error of a joint at rest: real files have the rounding errors of single precision and of old exporters."""
 
@@ -55,10 +58,45 @@ def static_child(subject: Subject) -> Iterator[Finding]:
             yield Finding("static-child", Severity.ERROR, joint.key, message, "give the child a mass, or fix the joint")
 
 
+def thread_elements(subject: Subject) -> set[str]:
+    """Keys of the bodies that a scene will simulate as elements of threads: see `ligature.model.rods`."""
+    if not subject.document.top.flag("ligature rod"):
+        return set()
+    round_bodies = {key for key, body in subject.bodies.items() if body.flag("ligature rod") and _round(subject, body)}
+    neighbours: dict[str, set[str]] = {}
+    for joint, parent, child in _ends(subject):
+        if {parent.key, child.key} <= round_bodies and joint.flag("ligature rod") and _bends(joint):
+            neighbours.setdefault(parent.key, set()).add(child.key)
+            neighbours.setdefault(child.key, set()).add(parent.key)
+    elements: set[str] = set()
+    for start, beside in neighbours.items():
+        chain, ahead = [start], beside if len(beside) == 1 else set()
+        while len(ahead) == 1:
+            chain += ahead
+            ahead = neighbours[chain[-1]] - set(chain)
+        if len(chain) >= LEAST_ELEMENTS:
+            elements |= set(chain)
+    return elements
+
+
+def _round(subject: Subject, body: Element) -> bool:
+    shapes = subject.shapes(body)
+    return subject.moves(body) and [shape.kind for shape, _ in shapes] in (["CAPSULE"], ["CYLINDER"], ["SPHERE"])
+
+
+def _bends(joint: Element) -> bool:
+    """Whether a joint is a spring that bends and does not stretch."""
+    pairs = _limit_pairs(joint)[:3]
+    return joint.value("type") == "six dof spring" and all(joint.number(a) == joint.number(b) for a, b in pairs)
+
+
 @rule("mass-ratio")
 def mass_ratio(subject: Subject) -> Iterator[Finding]:
-    """Solvers that iterate do not converge across large ratios."""
+    """Solvers that iterate do not converge across large ratios; that of a thread solves its joints directly."""
+    threads = thread_elements(subject)
     for joint, parent, child in _ends(subject):
+        if threads & {parent.key, child.key}:
+            continue
         a, b = parent.number("mass"), child.number("mass")
         if min(a, b) > 0.0 and max(a, b) > MASS_RATIO * min(a, b):
             message = f"it connects {a:g} kg and {b:g} kg, a ratio of {max(a, b) / min(a, b):.3g}"
