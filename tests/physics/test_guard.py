@@ -40,6 +40,47 @@ def test_a_body_that_is_thrown_is_reported_once_with_its_name(tmp_path: Path) ->
     simulation.step(200)
     (alarm,) = alarms(simulation)
     assert "BODY ball' moves at" in alarm.message and alarm.mark is not None
+    assert "BODY ball'" in alarm.message.split("likely cause: a command that pushed")[1]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_thread_of_a_body_that_is_pushed_is_not_blamed(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    simulation = ligature.Simulation(ligature.load("suturing_small"))
+    needle = simulation.bodies["Needle"]
+    needle.command_wrench([0, 0, 10.0 ** rng.uniform(4.0, 6.0), *rng.normal(size=3)])
+    simulation.step(30)
+    assert np.linalg.norm(needle.twist[:3]) > 50.0
+    assert not alarms(simulation), "pushed by command"
+    needle.release()
+    simulation.step(10)
+    simulation.step(10)
+    (alarm,) = alarms(simulation)
+    assert "a command that pushed '/ambf/env/phantom/BODY Needle'" in alarm.message
+    simulation.close()
+
+
+@pytest.mark.parametrize("ticks", [1, 3, 10, 25])
+def test_a_push_of_any_length_is_named(ticks: int, tmp_path: Path) -> None:
+    simulation = scene(tmp_path, {"BODY ball": BALL})
+    simulation.bodies["BODY ball"].command_wrench([2e4 / ticks, 0, 0, 0, 0, 0])
+    simulation.step(ticks)
+    simulation.bodies["BODY ball"].release()
+    simulation.step(20)
+    (alarm,) = alarms(simulation)
+    assert "a command that pushed" in alarm.message
+
+
+def test_a_push_that_ended_in_rest_is_not_named(tmp_path: Path) -> None:
+    simulation = scene(tmp_path, {"BODY ball": BALL})
+    simulation.bodies["BODY ball"].command_wrench([0.1, 0, 0, 0, 0, 0])
+    simulation.step(20)
+    simulation.bodies["BODY ball"].release()
+    simulation.step(20)
+    simulation._world.engine.place_of[0].set_twist(np.array([70.0, 0.0, 0.0]), np.zeros(3))
+    simulation.step(20)
+    (alarm,) = alarms(simulation)
+    assert "a command" not in alarm.message.split("likely cause")[1]
 
 
 def test_energy_from_nowhere_is_reported_below_fifty_metres_a_second(tmp_path: Path) -> None:

@@ -122,19 +122,40 @@ class Guard:
         gravity = np.array([body.gravity for body in scene.bodies]).reshape(-1, 3)
         self._gravity = float(np.linalg.norm(gravity, axis=1).max(initial=0.0))
         self._reported: set[int] = set()
+        self._acted: dict[int, str] = {}
 
     def reset(self) -> None:
         """Bodies were put elsewhere: they start from the motion that the state has."""
+        self._acted.clear()
         _suspect(self._twist, self._gyration, self._mass, self._rigid, self._before, np.inf)
 
     def check(self, seconds: float) -> Diagnostic | None:
         """What the state shows that was not reported; ``seconds`` have passed since the last check."""
         leap = LEAP + 2.0 * self._gravity * seconds
         suspect = _suspect(self._twist, self._gyration, self._mass, self._rigid, self._before, leap)
-        return None if suspect < 0 else self._report(suspect)
+        if suspect >= 0:
+            return self._report(suspect)
+        if self._acted:  # what is slow now will owe its speed to nothing that has ended
+            self._acted = {body: who for body, who in self._acted.items() if self._world.commanded({body})}
+        return None
+
+    def note(self, body: int, who: str = "a command") -> None:
+        """``who`` acts on a body: the likely cause of what is fast from now on, also when it has ended."""
+        self._acted[body] = who
+
+    def _linked(self, index: int) -> set[int]:
+        """The bodies of a tree or rod, and those that threads link to it."""
+        linked, size = self._world.kin(index), 0
+        while len(linked) > size:
+            size = len(linked)
+            for rod in self._scene.rods:
+                ends = {b for j in rod.anchors for b in (self._scene.joints[j].parent, self._scene.joints[j].child)}
+                if not linked.isdisjoint(ends):
+                    linked |= ends.union(*map(self._world.kin, ends))
+        return linked
 
     def _report(self, index: int) -> Diagnostic | None:
-        members = self._world.kin(index)
+        members = self._linked(index)
         if index in self._reported or self._world.commanded(members):
             return None
         self._reported |= members
@@ -148,6 +169,10 @@ class Guard:
     def _cause(self, body: Body, members: set[int]) -> tuple[str, str]:
         """Likely cause and remedy."""
         scene = self._scene
+        acted = next((i for i in (body.index, *sorted(members)) if i in self._acted), None)
+        if acted is not None:
+            name = scene.bodies[acted].identity.identifier
+            return f"{self._acted[acted]} that pushed '{name}'", "push less, or slow it down before the push ends"
         if body.index in scene.rod_bodies:
             return "a rod that is pulled or squeezed too hard", "check its joints and attachments"
         strong = float(np.linalg.norm(body.gravity))

@@ -235,6 +235,7 @@ class Host:
         self._body_names = [body.identity.identifier for body in scene.bodies]
         self._joint_names = [joint.identity.identifier for joint in scene.joints]
         self._volumes = {body: Volume(self, body, voxels) for body, voxels in volumes.items()}
+        self._pushed: set[int] = set()
         self._before, self._ahead = False, 0
 
     @contextmanager
@@ -254,6 +255,11 @@ class Host:
             yield
         finally:
             self._ahead = 0
+
+    def take_pushed(self) -> set[int]:
+        """The bodies that were pushed since the last call."""
+        pushed, self._pushed = self._pushed, set()
+        return pushed
 
     @property
     def time(self) -> float:
@@ -321,6 +327,7 @@ class Host:
         if np.linalg.norm(how) > MAX_FORCE:
             raise ValueError(f"a force is at most {MAX_FORCE:g} N, not {np.linalg.norm(how):g}")
         self._bodies.push(body, how, where, np.zeros((3, 3)))
+        self._pushed.add(body)
 
     def _check_before(self, what: str) -> None:
         if not self._before:

@@ -97,6 +97,10 @@ class Plugins(Subsystem):
         with self._host.after_step():
             self._call_all("after_step")
 
+    def take_pushed(self) -> set[int]:
+        """The bodies that plug-ins have pushed since the last call."""
+        return self._host.take_pushed()
+
     def receive(self, command: PluginCommand) -> None:
         """Take a message for a topic of a plug-in.
 
