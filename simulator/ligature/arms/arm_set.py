@@ -91,6 +91,11 @@ class ArmSet(Subsystem, Mapping[str, Arm]):
     def _fault(self, what: str, arm: Arm, error: Exception) -> None:
         arm.fault(f"{what} failed: {_words(error)}")
 
+    def end(self) -> None:
+        """The simulation is closed: the arms take no more commands."""
+        for arm in self._arms:
+            arm.end()
+
     def release(self, index: int) -> None:
         """The client that commanded an arm is gone: the arm holds its position."""
         arm = self._arms[index]

@@ -8,6 +8,7 @@ simulated time. A command that is not carried out raises `Rejected` and changes 
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, Protocol
 
@@ -20,7 +21,7 @@ from ligature.robots.device import Device
 from ligature.robots.impedance import CartesianImpedance
 from ligature.robots.inverse import REASONS, InverseResult, Reason
 from ligature.robots.operating_state import Rejected, State, towards_enabled
-from ligature.robots.poses import pose_matrix_of, turned
+from ligature.robots.poses import numbers_of, pose_matrix_of, turned
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,9 @@ NO_COMMON_RATIO = 0.0
 
 MOST_REFERENCE = 64
 """Bytes of the name of a reference frame: what the state has room for."""
+
+FARTHEST_BASE = 1e6
+"""Metres along an axis between the base and the origin of its reference frame; a tip then has 0.1 nm."""
 
 PULL_BACK = 1e-2
 """Damping of the inverse that turns twists into joint velocities: bounded near singular poses."""
@@ -183,6 +187,7 @@ class Arm(Device):
             self._direct = False
 
     def _require_joints(self, what: str) -> None:
+        self._check_running()
         if self._direct:
             return
         if self._state is not State.ENABLED:
@@ -283,6 +288,7 @@ class Arm(Device):
 
     def place_jp(self, position: ArrayLike) -> None:
         """Put the joints somewhere at once: for setting up an experiment, not a thing a real arm can do."""
+        self._check_running()
         self.joints.place(self.joints.checked(position, "place_jp"))
 
     # --- Cartesian space --------------------------------------------------------------------
@@ -321,7 +327,8 @@ class Arm(Device):
         return self.kinematics.jacobian_spatial(self.joints.measured()[0])
 
     def spatial_measured_cf(self) -> Array:
-        """Wrench (6,) that the world exerts on the tip, in base axes about the tip."""
+        """Wrench (6,) that the world exerts on the tip, in base axes about the tip; RuntimeError after `end`."""
+        self._check_running()
         if self._tip_wrench is not None:
             return self._tip_wrench()
         q, _, effort = self.joints.measured()
@@ -447,17 +454,25 @@ class Arm(Device):
 
     @staticmethod
     def _six(values: ArrayLike, what: str) -> Array:
-        numbers = np.array(values, dtype=float).reshape(-1)
+        numbers = numbers_of(values, what).reshape(-1)
         if len(numbers) != 6 or not np.isfinite(numbers).all():
             raise Rejected(f"{what} takes 6 finite numbers, not {numbers.tolist()}")
         return numbers
 
     def set_base_frame(self, pose: ArrayLike, reference: str) -> None:
-        """Set the pose of the base in a reference frame; `measured_cp` and `servo_cp` are in that frame then."""
+        """Set the pose of the base in a reference frame; `measured_cp` and `servo_cp` are in that frame then.
+
+        Raises `Rejected` for a name that is no text or too long, and for a pose farther away than `FARTHEST_BASE`.
+        """
+        if not isinstance(reference, str):
+            raise Rejected(f"set_base_frame takes the name of a frame, not {reprlib.repr(reference)}")
         size = len(reference.encode("utf-8"))
         if size > MOST_REFERENCE:  # cut off, it would be the name of another frame
             raise Rejected(f"set_base_frame: the name of the frame may have {MOST_REFERENCE} bytes, not {size}")
-        self._T_reference_base = pose_matrix_of(pose, "set_base_frame")
+        T = pose_matrix_of(pose, "set_base_frame")
+        if np.abs(T[:3, 3]).max() > FARTHEST_BASE:  # the position of the tip would have no digits left
+            raise Rejected(f"set_base_frame: the base must stay within {FARTHEST_BASE:g} m, not {T[:3, 3].tolist()}")
+        self._T_reference_base = T
         self.reference = reference
         self.emit("base_frame", reference)
 
@@ -486,9 +501,11 @@ class Arm(Device):
     def forward_kinematics(self, jp: ArrayLike, local: bool = False) -> Array:
         """Pose (7,) of the tip for joint values; missing ones at the end are zero.
 
-        Raises `Rejected` for too many values.
+        Raises `Rejected` for too many values, and for what is no finite number.
         """
-        values = np.array(jp, dtype=float).reshape(-1)
+        values = numbers_of(jp, "forward_kinematics").reshape(-1)
+        if not np.isfinite(values).all():
+            raise Rejected(f"forward_kinematics takes finite numbers, not {values.tolist()}")
         n = self.joints.n
         if len(values) > n:
             raise Rejected(f"too many joints: {self.name} has {n}, not {len(values)}")
@@ -500,32 +517,37 @@ class Arm(Device):
 
         Raises `Rejected` for a seed of the wrong length, and where there is no solution.
         """
-        values = np.array(seed, dtype=float).reshape(-1)
+        values = numbers_of(seed, "inverse_kinematics").reshape(-1)
         if len(values) != self.joints.n:
             raise Rejected(f"incorrect number of joints: {self.name} has {self.joints.n}, not {len(values)}")
         result = self.kinematics.inverse(pose_matrix_of(cp, "inverse_kinematics"), values)
         if not result.ok:
-            raise Rejected(f"inverse kinematics failed: {result.reason}")
+            raise Rejected(f"inverse kinematics failed: {result.explain(self.kinematics.joint_names)}")
         return result.q
 
     # --- trajectories -----------------------------------------------------------------------
 
     def trajectory_j_set_ratio(self, ratio: float) -> None:
         """Velocities and accelerations of moves as a fraction of the largest."""
+        ratio = self._ratio(ratio)
         self._set_ratio(ratio, ratio)
 
     def trajectory_j_set_ratio_v(self, ratio: float) -> None:
         """Velocities of moves as a fraction of the largest."""
-        self._set_ratio(ratio, None)
+        self._set_ratio(self._ratio(ratio), None)
 
     def trajectory_j_set_ratio_a(self, ratio: float) -> None:
         """Accelerations of moves as a fraction of the largest."""
-        self._set_ratio(None, ratio)
+        self._set_ratio(None, self._ratio(ratio))
+
+    @staticmethod
+    def _ratio(ratio: float) -> float:
+        numbers = numbers_of(ratio, "trajectory_j/set_ratio").reshape(-1)
+        if len(numbers) != 1 or not 0.0 < numbers[0] <= 1.0:
+            raise Rejected(f"a ratio must be above 0 and at most 1, not {reprlib.repr(ratio)}")
+        return float(numbers[0])
 
     def _set_ratio(self, v: float | None, a: float | None) -> None:
-        for ratio in (v, a):
-            if ratio is not None and not 0.0 < ratio <= 1.0:
-                raise Rejected(f"a ratio must be above 0 and at most 1, not {ratio:g}")
         for axes in self._groups():
             axes.ratio_v, axes.ratio_a = v or axes.ratio_v, a or axes.ratio_a
         if v is not None:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ligature.robots.operating_state import Rejected
 from ligature.robots.plant import Plant
+from ligature.robots.poses import numbers_of
 from ligature.robots.trajectory import JointTrajectory
 
 Array = NDArray[np.float64]
@@ -98,7 +99,7 @@ class Axes:
 
     def checked(self, values: ArrayLike, what: str) -> Array:
         """``values`` as n numbers; raises `Rejected` when they are not."""
-        numbers = np.array(values, dtype=float).reshape(-1)
+        numbers = numbers_of(values, what).reshape(-1)
         if len(numbers) != self.n:
             raise Rejected(f"{what} takes {_numbers(self.n)} ({', '.join(self.names)}), not {len(numbers)}")
         if not np.isfinite(numbers).all():

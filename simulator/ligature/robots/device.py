@@ -71,6 +71,7 @@ class Device:
         self._busy_until = 0.0
         self._homing = self._taken_over = False
         self._astray = 0.0
+        self._ended = False
         self._emit_state()
 
     # --- operating state --------------------------------------------------------------------
@@ -120,7 +121,8 @@ class Device:
         self.state_command("unhome")
 
     def state_command(self, command: str) -> None:
-        """Carry out one of the commands of CRTK's state machine."""
+        """Carry out one of the commands of CRTK's state machine; raises RuntimeError after `end`."""
+        self._check_running()
         step = action(command, self._state)
         if step is Action.POWER_UP:
             self._power_up(step)
@@ -148,6 +150,7 @@ class Device:
 
         Raises `Rejected` in FAULT.
         """
+        self._check_running()
         if self._state is State.FAULT:
             raise Rejected(f"{self.name} is in FAULT; {towards_enabled(self._state)}")
         if self._state is State.ENABLED and not self._homing and (self._homed or self._taken_over):
@@ -162,12 +165,21 @@ class Device:
 
         Raises `Rejected` in FAULT.
         """
+        self._check_running()
         if self._state is State.FAULT:
             raise Rejected(f"{self.name} is in FAULT; {towards_enabled(self._state)}")
         self._state, self._homed, self._pending = State.ENABLED, True, None
         self._busy = self._homing = False
         self._hold_all()
         self._emit_state()
+
+    def end(self) -> None:
+        """The simulation is closed: every command raises RuntimeError from now on, for nothing would carry it out."""
+        self._ended = True
+
+    def _check_running(self) -> None:
+        if self._ended:
+            raise RuntimeError(f"the simulation of {self.name} is closed; make a new one")
 
     def _power_up(self, then: Action) -> None:
         """Begin to switch the drives on, or continue: clients repeat a command until it takes effect."""

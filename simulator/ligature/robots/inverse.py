@@ -41,11 +41,12 @@ class Reason(enum.IntEnum):
     SINGULAR = 4
     """Infinitely many joint values give the pose."""
     NOT_A_POSE = 5
-    """The matrix holds a number that is not finite, or no right-handed rotation."""
+    """The matrix holds a number that is not finite, more than 1000 km along an axis, or no right-handed rotation."""
 
 
 REASONS = np.array(
-    ["", "unreachable", "outside limits", "above the remote centre", "singular", "not a rigid pose"], dtype=object
+    ["", "unreachable", "outside limits", "above the remote centre", "singular", "not a rigid pose within 1000 km"],
+    dtype=object,
 )
 """Text of each `Reason`."""
 
@@ -103,9 +104,11 @@ def seed_rows(seed: ArrayLike | None, n: int, m: int) -> Array:
     """
     if seed is None:
         return np.zeros((1, n))
-    rows = np.array(seed, dtype=np.float64, order="C").reshape(-1, n)
-    if len(rows) not in (1, m):
-        raise ValueError(f"expected one seed of {n} joint values, or one for each of {m} poses, got {len(rows)}")
+    values = np.array(seed, dtype=np.float64, order="C")
+    if values.shape[-1:] != (n,) or values.size // n not in (1, m):
+        got = values.size // n if values.shape[-1:] == (n,) else f"the shape {values.shape}"
+        raise ValueError(f"expected one seed of {n} joint values, or one for each of {m} poses, got {got}")
+    rows = values.reshape(-1, n)
     return np.where(np.isfinite(rows), rows, 0.0)
 
 
@@ -125,7 +128,7 @@ class Answers:
             return InverseResult(self.q[0], self.code[0], self.joint[0], self.residual[0])
         shape = self.shape
         return InverseResult(
-            self.q.reshape(*shape, -1), self.code.reshape(shape), self.joint.reshape(shape),
+            self.q.reshape(*shape, self.q.shape[1]), self.code.reshape(shape), self.joint.reshape(shape),
             self.residual.reshape(shape),
         )  # fmt: skip
 

@@ -17,7 +17,7 @@ from ligature.robots.mtm import Mtm
 from ligature.robots.mtm_weight import MAX_EFFORT, weight
 from ligature.robots.operating_state import Rejected
 from ligature.robots.plant import IdealPlant
-from ligature.robots.poses import rotation_vector
+from ligature.robots.poses import numbers_of, rotation_vector
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class MtmArm(Arm):
 
         Raises `Rejected` unless it is a finite quaternion of length 1, to 10 percent.
         """
-        values = np.array(quaternion, dtype=float).reshape(-1)
+        values = numbers_of(quaternion, "lock_orientation").reshape(-1)
         if len(values) != 4 or not np.isfinite(values).all() or not 0.9 <= np.linalg.norm(values) <= 1.1:
             raise Rejected(f"lock_orientation takes a quaternion of length 1, not {values.tolist()}")
         R = quaternion_matrix(values / np.linalg.norm(values))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import reprlib
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +14,20 @@ from ligature.robots.operating_state import Rejected
 Array = NDArray[np.float64]
 
 
+def numbers_of(values: ArrayLike, what: str) -> Array:
+    """``values`` as an array of its own; raises `Rejected` where they are no numbers."""
+    try:
+        array = np.array(values)
+        if array.dtype.kind == "c":
+            raise TypeError("complex numbers")
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise Rejected(f"{what} takes numbers, not {reprlib.repr(values)}") from error
+
+
 def pose_matrix_of(pose: ArrayLike, what: str) -> Array:
     """A pose, (7,) or (4, 4), as (4, 4); raises `Rejected` for anything else."""
-    values = np.array(pose, dtype=float)
+    values = numbers_of(pose, what)
     if not np.isfinite(values).all():
         raise Rejected(f"{what} takes finite numbers")
     if values.shape == (4, 4):
