@@ -5,12 +5,14 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Callable
 from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import ligature
 import numpy as np
 import pytest
+from ligature.model.commands import BodyCommand, CommandType
 from ligature.model.frames import pose7_matrix
 from ligature.render.context import RenderUnavailable, create_context
 
@@ -108,6 +110,11 @@ def test_what_is_no_path_no_arm_and_no_name_is_reported(scene: ligature.Scene) -
     for path in (5, None, b"suturing", ["suturing"]):
         with pytest.raises(TypeError, match="it must be the path of a file, or the name of a scene"):
             ligature.load(path)  # type: ignore[arg-type]
+    with pytest.raises(ligature.SceneError, match="holds a NUL character"):
+        ligature.load("suturing\0small")
+    for what in ("files", "roots", "soft", "arms"):
+        with pytest.raises(TypeError, match=f"{what} is 5; it must be a list"):
+            ligature.load("peg_transfer", **{what: 5})  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="arms is .* it must be a list of mappings"):
         ligature.load("peg_transfer", arms=["MTML=mtm"])  # type: ignore[list-item]
     with ligature.Simulation(scene) as sim:
@@ -117,6 +124,68 @@ def test_what_is_no_path_no_arm_and_no_name_is_reported(scene: ligature.Scene) -
         for size in ("big", (10.5, 10), (1,), 5, (None, 1)):
             with pytest.raises(TypeError, match="a size of pictures must be a width and a height"):
                 sim.cameras["eye"].view(size)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("dt", [1, True, np.float32(1e-3), Fraction(1, 1000), np.int8(1)])
+def test_a_tick_of_any_type_is_a_number_of_double_precision(scene: ligature.Scene, dt: Any) -> None:
+    """For any other type, all code would be compiled again."""
+    with ligature.Simulation(scene, dt, update=2 * dt) as sim:
+        assert type(sim.dt) is float and sim.dt == float(dt)
+        assert sim.ticks_per_update == 2
+        for name in ("dt", "scene", "ticks_per_update"):
+            with pytest.raises(AttributeError):
+                setattr(sim, name, getattr(sim, name))
+
+
+@pytest.mark.parametrize("body", ["Needle", 2, -1, 3.5, None, np.float64(0.0), 10**30, [0]])
+def test_what_is_no_body_is_reported(scene: ligature.Scene, body: Any) -> None:
+    with ligature.Simulation(scene) as sim:
+        before = sim.state_hash()
+        for act in (sim.touched, lambda index: sim.set_pose(index, np.array(POSE))):
+            with pytest.raises((TypeError, ValueError), match="it must be an index|no body number"):
+                act(body)
+        assert sim.state_hash() == before
+
+
+@pytest.mark.parametrize("command", ["home", None, 3, [0.0] * 6, object(), CommandType.FORCE])
+def test_what_is_no_command_is_reported(scene: ligature.Scene, command: Any) -> None:
+    with ligature.Simulation(scene) as sim, pytest.raises(TypeError, match=r"takes the commands of ligature\.model"):
+        sim.apply(command)
+
+
+@pytest.mark.parametrize("number", list(CommandType))
+def test_a_type_of_command_may_be_its_number(scene: ligature.Scene, number: CommandType) -> None:
+    """A number was taken for a position."""
+    target = (0.0,) * 6 if number is not CommandType.POSITION else tuple(POSE)
+    wanted = BodyCommand(0, number, target, (number,), (0.5,))
+    for kind in (int(number), np.int64(number), float(number)):
+        command = BodyCommand(0, kind, target, (kind,), (0.5,))  # type: ignore[arg-type]
+        command.check()
+        assert command == wanted and command.type is number and command.joint_types[0] is number
+
+
+@pytest.mark.parametrize("kind", ["POSITION", None, 7, -1, 1.5, [1]])
+def test_what_is_no_type_of_command_is_reported(scene: ligature.Scene, kind: Any) -> None:
+    with ligature.Simulation(scene) as sim:
+        for act in (
+            lambda: sim.bodies["Needle"].command_joints([0.1], kind),
+            lambda: sim.apply(BodyCommand(0, kind, (0.0,) * 6)),
+        ):
+            with pytest.raises(ValueError, match=r"is not one of FORCE \(0\), POSITION \(1\), VELOCITY \(2\)"):
+                act()
+
+
+def test_an_element_of_a_thread_takes_no_command() -> None:
+    with ligature.Simulation(ligature.load("suturing_small")) as sim:
+        element = sim.bodies["Thread_005"]
+        for act in (
+            lambda: element.command_wrench([0.0] * 6),
+            lambda: element.command_pose(POSE),
+            lambda: element.command_twist([0.0] * 6),
+            lambda: element.command_joints([0.0]),
+        ):
+            with pytest.raises(ValueError, match="is an element of a thread and takes no commands"):
+                act()
 
 
 def test_what_is_no_scene_is_reported() -> None:

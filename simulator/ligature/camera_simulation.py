@@ -33,8 +33,15 @@ class Simulation(simulation.Simulation):
         return camera_handles(self._studio)
 
     def change_look(self, look: Look) -> None:
-        """Have lights and bodies look otherwise in all pictures from now on; raises ImportError as `cameras` does."""
+        """Have lights and bodies look otherwise in all pictures from now on.
+
+        Raises ImportError as `cameras` does, TypeError for anything but a look.
+        """
         _ = self.cameras
+        from ligature.render.look import Look
+
+        if not isinstance(look, Look):
+            raise TypeError(f"change_look takes a ligature.render.look.Look, not {look!r}")
         assert self._studio is not None
         self._studio.change_look(look)
 

@@ -7,7 +7,7 @@ import os
 import re
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -80,9 +80,11 @@ def check_folder(folder: Path) -> None:
 
 
 def check_list(what: str, given: object) -> None:
-    """Raise TypeError where one text or path is ``given`` for a list of them: each letter would be one, as ``/``."""
+    """Raise TypeError where no list is ``given``, or one text or path for it: each letter would be one, as ``/``."""
     if isinstance(given, str | bytes | os.PathLike):
         raise TypeError(f"{what} is {given!r}; it must be a list, such as [{given!r}]")
+    if not isinstance(given, Iterable):
+        raise TypeError(f"{what} is {given!r}; it must be a list")
 
 
 def part_of(path: Path) -> Path:

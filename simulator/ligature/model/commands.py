@@ -10,6 +10,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ligature.model.messages import (
     FLAG,
@@ -58,6 +59,14 @@ _TARGETS: dict[CommandType, Field] = {
 }
 
 
+def _type_of(value: Any) -> Any:
+    """The `CommandType` of a number, or ``value`` itself where it is none, for the check."""
+    try:
+        return CommandType(value)
+    except ValueError:
+        return value
+
+
 @dataclass(frozen=True)
 class Command(Message):
     """A command that the simulation executes and records contain."""
@@ -76,6 +85,13 @@ class BodyCommand(Command, code=1):
     target: Vector = wire(Numbers(bound=float("inf")), "the command")
     joint_types: tuple[CommandType, ...] = wire(Choices(tuple(sorted(CommandType))), default=())
     joint_values: Vector = wire(Numbers(bound=MAX_FORCE), "joint commands", default=())
+
+    def __post_init__(self) -> None:
+        """Take numbers for types: what carries commands out tells types apart by identity."""
+        if not isinstance(self.type, CommandType):
+            object.__setattr__(self, "type", _type_of(self.type))
+        if not all(isinstance(item, CommandType) for item in self.joint_types):
+            object.__setattr__(self, "joint_types", tuple(map(_type_of, self.joint_types)))
 
     @property
     def object(self) -> tuple[str, int]:  # noqa: D102

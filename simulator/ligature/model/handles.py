@@ -18,7 +18,7 @@ from ligature.adf.schema import PLURALS
 from ligature.model.commands import BodyCommand, Command, CommandType, Release
 from ligature.model.frames import matrix_pose7
 from ligature.model.lookup import UnknownNameError, find_by_text
-from ligature.model.scene import Body, Camera, Joint
+from ligature.model.scene import Body, Camera, Joint, Scene
 from ligature.model.state import StateRecord
 
 Array = NDArray[np.float64]
@@ -32,6 +32,10 @@ class Running(Protocol):
     """What handles need of the simulation."""
 
     state: StateRecord
+
+    @property
+    def scene(self) -> Scene:
+        """What is simulated."""
 
     def apply(self, command: Command) -> None:
         """Take a command; it acts from the next tick on."""
@@ -127,7 +131,11 @@ class BodyHandle:
         self._command(CommandType.FORCE, numbers_of("command_wrench", wrench, "fx fy fz tx ty tz"))
 
     def command_joints(self, values: ArrayLike, type: CommandType = CommandType.POSITION) -> None:
-        """Command the active joints below this body, in the order of ``body.joints``."""
+        """Command the active joints below this body, in the order of ``body.joints``.
+
+        Raises ValueError for a ``type`` that is no `CommandType`, and for an element of a thread.
+        """
+        self._check_commandable()
         targets = numbers_of("command_joints", values, "one for each joint, or fewer")
         self._simulation.apply(
             BodyCommand(
@@ -143,7 +151,16 @@ class BodyHandle:
         """Drop whatever was commanded: joints go limp, forces cease."""
         self._simulation.apply(Release("body", self.body.index))
 
+    def _check_commandable(self) -> None:
+        """Raise ValueError for an element of a thread: its rod follows no command."""
+        if self.body.index in self._simulation.scene.rod_bodies:
+            raise ValueError(
+                f"body '{self.body.identity.identifier}' is an element of a thread and takes no commands; "
+                "command a body at an end of it"
+            )
+
     def _command(self, type: CommandType, target: tuple[float, ...]) -> None:
+        self._check_commandable()
         self._simulation.apply(BodyCommand(self.body.index, type, target))
 
 

@@ -75,6 +75,8 @@ def load(
     """
     if not isinstance(path, str | os.PathLike):
         raise TypeError(f"path is {path!r}; it must be the path of a file, or the name of a scene such as 'suturing'")
+    if "\0" in os.fspath(path):  # the system would raise a ValueError of its own for it
+        raise SceneError(Diagnostic(Severity.ERROR, f"{os.fspath(path)!r} holds a NUL character, as no path does"))
     models, devices = indices("models", models), indices("devices", devices) or ()
     for what, given in (("files", files), ("roots", roots), ("soft", soft), ("arms", arms or ())):
         check_list(what, given)

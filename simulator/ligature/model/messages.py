@@ -8,6 +8,7 @@ followed by its fields in order, little-endian.
 from __future__ import annotations
 
 import dataclasses
+import enum
 import functools
 import math
 import struct
@@ -98,8 +99,7 @@ class Choice(Field):
         return self.options[data[at]], at + 1
 
     def check(self, what: str, value: Any) -> None:  # noqa: D102
-        if value not in self.options:
-            raise CodecError(f"'{str(value)[:40]}' is not one of {', '.join(map(str, self.options))}")
+        _check_option(value, self.options)
 
 
 @dataclass(frozen=True)
@@ -118,6 +118,8 @@ class Choices(Field):
 
     def check(self, what: str, value: Any) -> None:  # noqa: D102
         _fits(value)
+        for item in value:
+            _check_option(item, self.options)
 
 
 @dataclass(frozen=True)
@@ -226,6 +228,12 @@ def check_unit(quaternion: Vector) -> None:
     length = math.sqrt(sum(v * v for v in quaternion))
     if not 0.9 <= length <= 1.1:
         raise ValueError(f"the quaternion has the length {length:.3g}; it must be 1")
+
+
+def _check_option(value: Any, options: tuple[Any, ...]) -> None:
+    if value not in options:
+        names = ", ".join(f"{o.name} ({o.value})" if isinstance(o, enum.Enum) else str(o) for o in options)
+        raise CodecError(f"'{str(value)[:40]}' is not one of {names}")
 
 
 def _fits(values: Any, most: int = MAX_NUMBERS) -> None:

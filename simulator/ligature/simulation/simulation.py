@@ -7,6 +7,7 @@ the same scene, commands and calls give the same bits.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
@@ -31,7 +32,7 @@ from ligature.model.commands import (
     object_counts,
 )
 from ligature.model.frames import inverse, matrix_pose7, pose7_matrix
-from ligature.model.handles import BodyHandle, Handles, JointHandle
+from ligature.model.handles import BodyHandle, Handles, JointHandle, pose_numbers
 from ligature.model.messages import Message, handle
 from ligature.model.scene import Actuator, Body, Camera, Light, Scene
 from ligature.model.state import FieldViews, StateRecord, new_state
@@ -84,6 +85,8 @@ class Simulation:
     ------
     ValueError
         For a length that is not above 0 and finite.
+    TypeError
+        For anything but a scene.
     """
 
     def __init__(
@@ -96,12 +99,14 @@ class Simulation:
         if scene.plugins and not allow_plugins:
             scene = replace(scene, plugins=())
         for name, value in (("dt", dt), ("update", update)):
-            if value is not None and not (isinstance(value, Real) and 0.0 < value < math.inf):
-                raise ValueError(f"{name} is {value}; it must be a number of seconds above 0")
+            if (name == "dt" or value is not None) and not (isinstance(value, Real) and 0.0 < value < math.inf):
+                raise ValueError(f"{name} is {value!r}; it must be a number of seconds above 0")
+        # compiled code would be compiled again for a whole number or one of single precision, for minutes
+        dt, update = float(dt), None if update is None else float(update)
         count_in(self)
-        self.scene = scene
-        self.dt = dt
-        self.ticks_per_update = max(1, round((update or dt) / dt))
+        self._scene = scene
+        self._dt = dt
+        self._ticks_per_update = max(1, round((update or dt) / dt))
         self.state: StateRecord = new_state(scene)
         self._closed = False
         self._clock = Clock()
@@ -123,7 +128,22 @@ class Simulation:
         self._write_state()
         self._watch_anew()
 
+    @property
+    def scene(self) -> Scene:
+        """What is simulated."""
+        return self._scene
+
     # --- time -------------------------------------------------------------------------------
+
+    @property
+    def dt(self) -> float:
+        """Length of a tick in seconds."""
+        return self._dt
+
+    @property
+    def ticks_per_update(self) -> int:
+        """Ticks of an update."""
+        return self._ticks_per_update
 
     @property
     def time(self) -> float:
@@ -154,6 +174,8 @@ class Simulation:
         passed = self._clock.tick - self._watched
         if passed >= GUARD_TICKS:
             self._watched = self._clock.tick
+            for body in self._parts.plugins.take_pushed():
+                self._guard.note(body, "a plug-in")
             try:
                 alarm = self._guard.check(passed * self.dt)
             except Exception as error:
@@ -180,20 +202,38 @@ class Simulation:
         return self._suture.holes.insertions
 
     def touched(self, body: int) -> frozenset[int]:
-        """Rigid bodies that ``body`` touches, as after the last tick."""
+        """Rigid bodies that ``body`` touches, as after the last tick.
+
+        Raises ValueError for a number that no body has, TypeError for anything but a number.
+        """
         self._check_open()
+        body = self._index_of(body)
         return frozenset(contact.body for contact in self._world.queries.contacts(body, 0.0))
+
+    def _index_of(self, body: Any) -> int:
+        """``body`` as the index of a body; raises TypeError or ValueError where it is none."""
+        try:
+            index = operator.index(body)
+        except TypeError:
+            raise TypeError(f"body is {body!r}; it must be an index, as bodies['NAME'].body.index is") from None
+        if not 0 <= index < len(self.scene.bodies):
+            raise ValueError(f"the scene has no body number {index}, only 0 to {len(self.scene.bodies) - 1}")
+        return index
 
     # --- commands ---------------------------------------------------------------------------
 
     def apply(self, command: Command) -> None:
         """Take a command; it acts from the next tick on.
 
-        Raises ValueError, and changes nothing, for invalid values, and for an object that the scene does not have.
+        Raises ValueError, and changes nothing, for invalid values, and for an object that the scene does not have;
+        TypeError for anything but a command.
         What an arm rejects becomes its warning, what goes wrong in it its FAULT. What goes wrong in another object
         clears its command and is among `problems`.
         """
         self._check_open()
+        if not isinstance(command, Command):
+            where = "ligature.model.commands and ligature.robots.commands"
+            raise TypeError(f"a simulation takes the commands of {where}, not {command!r}")
         command.check(self._counts)
         try:
             handle(self._handlers, command)
@@ -201,6 +241,9 @@ class Simulation:
             self.problems.append(failure(self._name_of(command), error))
             if isinstance(command, BodyCommand):
                 self._world.release(command.body)
+        else:
+            if isinstance(command, BodyCommand):
+                self._guard.note(command.body)
 
     def _handlers_of_commands(self) -> dict[type[Message], Callable[[Any], None]]:
         """What takes the commands of each class."""
@@ -255,15 +298,20 @@ class Simulation:
         body
             Index of the body in the scene.
         pose
-            (7,) position (m) and quaternion x, y, z, w in the world.
+            (7,) position (m) and quaternion x, y, z, w in the world, or a matrix (4, 4).
 
         Raises
         ------
         ValueError
-            For a body that joints hold to one that stands, as a link of an arm, and for an element of a thread.
+            For a number that no body has, for a body that joints hold to one that stands, as a link of an arm, and
+            for an element of a thread.
+        TypeError
+            For a body that is no number, as a name, and for a pose of anything but numbers.
         """
         self._check_open()
-        BodyCommand(body, CommandType.POSITION, tuple(pose)).check(self._counts)
+        body, numbers = self._index_of(body), pose_numbers("set_pose", pose)
+        BodyCommand(body, CommandType.POSITION, numbers).check(self._counts)
+        pose = np.array(numbers)
         moved = self._world.moving_with(body)
         root = moved[0]
         T = pose7_matrix(pose) @ inverse(pose7_matrix(self._world.pose7(body)))
@@ -334,6 +382,7 @@ class Simulation:
         """End plug-ins and free the physics engine: what needs it raises RuntimeError afterwards; the state remains."""
         self._closed = True
         self._parts.plugins.close()
+        self.arms.end()
         self._world.close()
 
     def __enter__(self: Simulated) -> Simulated:
