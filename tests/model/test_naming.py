@@ -78,3 +78,44 @@ def test_a_name_that_another_object_has_is_reported_with_what_it_gets(tmp_path: 
         "m.yaml:3:11: warning: body 'B' shares the topics '/xy'; it gets '/xy1'; "
         "give each object a name of its own; blanks in names do not count"
     )
+
+
+BROKEN = {
+    "bodies": "mass: 1, mesh: none.obj", "ghost objects": "mesh: none.obj", "cameras": "location: 3",
+    "sensors": "type: Proximity, parent: B0, array: []", "actuators": "type: Constraint, parent: none",
+    "joints": LISTS["joints"].replace("child: B1", "child: none"),
+    "sutures": "length: 0.1, diameter: 0.001, elements: 0", "soft bodies": "mesh: none.obj",
+}  # fmt: skip
+NAMES = st.tuples(st.sampled_from(["x", " x", "x1"]), SPACES)
+LOST = st.lists(st.tuples(st.just(True), st.sampled_from(list(BROKEN)), NAMES), min_size=1, max_size=6)
+KEPT = st.lists(st.tuples(st.just(False), st.sampled_from(list(LISTS)), NAMES), min_size=1, max_size=6)
+
+
+@settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.tuples(LOST, KEPT).flatmap(lambda both: st.permutations(both[0] + both[1])))
+def test_an_object_that_is_left_out_takes_no_name_from_others(tmp_path: Path, objects: list[tuple]) -> None:
+    def names(with_lost: bool) -> list[tuple[str, str]]:
+        lists: dict[str, list[str]] = {"bodies": ["B0", "B1"]}
+        text = "o: &o {x: 0, y: 0, z: 0}\nz: &z {x: 0, y: 0, z: 1}\nB0: {name: b0, mass: 1}\nB1: {name: b1, mass: 1}\n"
+        for number, (lost, kind, (name, space)) in enumerate(objects):
+            if lost and not with_lost:
+                continue
+            lists.setdefault(kind, []).append(f"K{number}")
+            content = (BROKEN if lost else LISTS)[kind]
+            text += f"K{number}: {{name: '{name}', namespace: '{space}', {content}}}\n"
+        text += "".join(f"{kind}: [{', '.join(keys)}]\n" for kind, keys in lists.items())
+        (tmp_path / "m.yaml").write_text(text)
+        scene = load(tmp_path / "m.yaml")
+        kinds = (scene.bodies, scene.joints, scene.ghosts, scene.sensors, scene.actuators, scene.cameras, scene.lights)
+        shared = sum(d.code == "name" for d in scene.diagnostics)
+        found = [(thing.identity.identifier, thing.identity.topic) for things in kinds for thing in things]
+        return [*found, ("shared", str(shared))]
+
+    assert names(with_lost=True) == names(with_lost=False)
+
+
+def test_a_body_that_is_left_out_leaves_its_topic_to_the_next_of_its_name(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text("bodies: [A, B]\nA: {name: x, mesh: none.obj}\nB: {name: x, mass: 1}\n")
+    scene = load(tmp_path / "m.yaml")
+    assert [body.identity.topic for body in scene.bodies] == ["/x"]
+    assert not [d for d in scene.diagnostics if d.code == "name"]

@@ -154,6 +154,11 @@ class SceneBuilder:
 
     def _identity(self, kind: str, element: Element, model: Model) -> Identity:
         identity = self._names[kind].identity(element, model.namespace, model.index)
+        self._note_shared(element, identity)
+        return identity
+
+    def _note_shared(self, element: Element, identity: Identity) -> None:
+        """Report where an object has another name than the file says, because an earlier object has that."""
         name = element.text("name").replace(" ", "")
         repeated = identity.identifier != identity.namespace + element.key  # a file that is loaded twice needs no word
         if name and identity.name != name and not repeated:
@@ -161,7 +166,6 @@ class SceneBuilder:
             message = f"{element.kind} '{element.key}' shares the topics '{shared}'; it gets '{identity.topic}'"
             hint = "give each object a name of its own; blanks in names do not count"
             self.report(Diagnostic(Severity.WARNING, message, element.mark_of("name"), hint, "name"))
-        return identity
 
     def _remap(self, kind: str, element: Element, model: Model) -> str:
         """The suffix of an object of whose name an earlier file has one, as where a file is loaded twice."""
@@ -175,12 +179,14 @@ class SceneBuilder:
         local = []
         taken: set[str] = set()
         for part in parts.bodies:
-            element, identity = part.element, self._identity("body", part.element, model)
-            self.diagnostics += part.findings
+            element, identity = part.element, self._names["body"].identity(part.element, model.namespace, model.index)
             if part.make is None:
-                self._names["body"].identifiers.pop()
+                self._names["body"].free(identity)
+                self.diagnostics += part.findings
                 self.lost.add(identity.identifier, len(self.diagnostics) - 1)
                 continue
+            self._note_shared(element, identity)
+            self.diagnostics += part.findings
             body = part.make(index=len(self.bodies), identity=identity)
             self.bodies.append(body)
             base = identity.namespace + identity.key
@@ -248,6 +254,7 @@ class SceneBuilder:
             try:
                 bodies, joints = thread(element, identity, len(self.bodies), len(self.joints), gravity, held)
             except GeometryError as error:
+                self._names["suture"].free(identity)
                 self.report(error.diagnostic)
                 continue
             self.bodies += bodies
@@ -295,16 +302,17 @@ class SceneBuilder:
             self.diagnostics += part.findings
             if part.make is None:
                 continue
-            identity = self._identity("sensor", element, model)
+            identity = self._names["sensor"].identity(element, model.namespace, model.index)
             sensor = part.make(index=len(self.sensors), identity=identity, parent=parent)
             if sensor.type is not SensorType.CONTACT and not len(sensor.rays):
-                self._names["sensor"].identifiers.pop()
+                self._names["sensor"].free(identity)
                 sources = [name for name in ("array", "mesh", "parametric") if element.has(name)]
                 if sources:  # the checker reports those without
                     message = f"'{sources[0]}' of sensor '{element.key}' gives no ray; it is left out"
                     hint = "list at least one ray"
                     self.report(Diagnostic(Severity.WARNING, message, element.mark_of(sources[0]), hint, "sensor"))
                 continue
+            self._note_shared(element, identity)
             self.sensors.append(sensor)
 
     def _add_actuators(self, document: Document, model: Model, local: list[int]) -> None:

@@ -38,6 +38,8 @@ class Names:
 
     identifiers: list[str] = field(default_factory=list)
     topics: set[str] | None = None
+    _topic_of: dict[str, str] = field(default_factory=dict)
+    """The topic that each identifier took of ``topics``."""
 
     def identity(self, element: Element, namespace: str, model: int, passive: bool | None = None) -> Identity:
         """The identity of ``element`` in a file with ``namespace``; it is registered as taken."""
@@ -52,6 +54,7 @@ class Names:
             if self.topics is not None and not passive:
                 name += free_suffix(topic_name(space, name), self.topics)
                 self.topics.add(topic_name(space, name))
+                self._topic_of[base + suffix] = topic_name(space, name)
         else:
             name = suffix
         parent = element.text("parent") if element.kind != "suture" else ""
@@ -68,6 +71,13 @@ class Names:
             mark=element.mark,
             namespace=space,
         )
+
+    def free(self, identity: Identity) -> None:
+        """Take back the ``identity`` of an object that is left out, so that a later one may have its names."""
+        self.identifiers.remove(identity.identifier)
+        topic = self._topic_of.pop(identity.identifier, None)
+        if self.topics is not None and topic is not None:
+            self.topics.remove(topic)
 
 
 def prefixed(scene: Scene, prefix: str) -> Scene:
