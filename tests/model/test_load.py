@@ -95,9 +95,35 @@ def test_an_ambiguous_parent_is_reported_with_its_candidates(lab) -> None:
     joint = f"joints: [J]\nJ: {{name: j, type: fixed, parent: Thr, child: BODY b, {AXES}}}\n"
     scene = lab(m=bodies("Thr1", "Thr2", "b") + joint)
     assert scene.joints == ()
-    assert "joint 'J' is left out: its parent 'Thr' is ambiguous (/ambf/env/BODY Thr1, /ambf/env/BODY Thr2" in reported(
-        scene
-    )
+    assert (
+        "joint 'J' is left out: its parent 'Thr' is ambiguous (/ambf/env/BODY Thr1, /ambf/env/BODY Thr2); "
+        "write one of these in full"
+    ) in reported(scene)
+
+
+def test_of_many_candidates_three_are_named_once(lab) -> None:
+    sensor = "sensors: [S]\nS: {name: s, type: Contact, parent: Thr}\n"
+    scene = lab(m=bodies(*(f"Thr{i}" for i in range(9))) + sensor)
+    names = ", ".join(f"/ambf/env/BODY Thr{i}" for i in range(3))
+    assert f"its parent 'Thr' is ambiguous ({names}, …); write one of these in full" in reported(scene)
+
+
+@pytest.mark.parametrize("kind", ["sensors", "actuators", "joints"])
+@pytest.mark.parametrize("start", [0, 1, 9, 10, 11, 14, 15, 16, 17])
+def test_a_part_of_a_name_is_reported_with_the_body_that_it_stands_for(lab, kind: str, start: int) -> None:
+    whole = "/ambf/env/BODY Base"
+    content = {
+        "sensors": "type: Contact", "actuators": "type: Constraint", "joints": f"type: fixed, child: BODY tip, {AXES}",
+    }[kind]  # fmt: skip
+    for end in (len(whole), len(whole) - 1):
+        text = whole[start:end]
+        if not text or whole.count(text) != 1 or text in "/ambf/env/BODY tip":
+            continue
+        scene = lab(m=bodies("Base", "tip") + f"{kind}: [X]\nX: {{name: x, parent: '{text}', {content}}}\n")
+        (made,) = getattr(scene, kind)
+        assert made.parent == 0
+        told = f"parent '{text}' of {kind[:-1]} 'X' is incomplete; using '{whole}'" in reported(scene, Severity.INFO)
+        assert told == (not text.endswith("BODY Base"))
 
 
 def test_a_chain_commands_its_joints_from_base_to_tip(lab) -> None:

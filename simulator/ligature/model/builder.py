@@ -397,23 +397,26 @@ class SceneBuilder:
             pool = local_names if within else names
             found = candidates(pool, wanted) if wanted else []
             if len(found) == 1:
-                return local[found[0]] if within else found[0]
-            ambiguous += [pool[i] for i in found]
+                body = local[found[0]] if within else found[0]
+                self._note_incomplete(element, key, self.bodies[body].identity)
+                return body
+            ambiguous += [pool[i] for i in found if pool[i] not in ambiguous]
         dependant = f"{element.kind} '{element.key}'" if fate == LEFT_OUT else f"'{key}' of '{element.key}'"
         if not ambiguous and self.lost.took_along(dependant, (text, namespace + text)):
             return None
-        reason = f"is ambiguous ({', '.join(ambiguous[:3])}, …)" if ambiguous else "does not exist"
+        shown = [*ambiguous[:3], *(["…"] if len(ambiguous) > 3 else [])]
+        reason = f"is ambiguous ({', '.join(shown)})" if ambiguous else "does not exist"
         message = f"{element.kind} '{element.key}' {fate}: its {key} '{text}' {reason}"
-        self.report(
-            Diagnostic(
-                Severity.ERROR,
-                message,
-                element.mark_of(key),
-                "name a body of this or an earlier file",
-                "reference",
-            )
-        )
+        hint = "write one of these in full" if ambiguous else "name a body of this or an earlier file"
+        self.report(Diagnostic(Severity.ERROR, message, element.mark_of(key), hint, "reference"))
         return None
+
+    def _note_incomplete(self, element: Element, key: str, found: Identity) -> None:
+        """Report a text that is only a part of the name of the body that it stands for, as a mistyped one may be."""
+        text = element.text(key)
+        if not text.endswith(found.key):
+            message = f"{key} '{text}' of {element.kind} '{element.key}' is incomplete; using '{found.identifier}'"
+            self.report(Diagnostic(Severity.INFO, message, element.mark_of(key), "", "parent"))
 
 
 def _device(element: Element) -> InputDevice:
