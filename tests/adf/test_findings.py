@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from ligature.adf import Document, Resolver, read_model
 from ligature.adf.checker import MAX_FINDINGS
 from ligature.adf.reader import read_text
+from ligature.adf.schema import LISTS, SCHEMA, Type
 
 JOINT = (
     "joints: [J]\nJ:\n  name: j\n  parent: A\n  child: B\n  {keys}\n"
@@ -82,6 +83,35 @@ def test_the_hint_at_an_unknown_key_names_what_was_meant() -> None:
         ("unknown key 'bodeis' in model file", "did you mean 'bodies'?"),
         ("unknown key 'zzz' in model file", "it has no effect"),
     ]
+
+
+COMMAS = {
+    Type.NUMBER: ["1,25"],
+    Type.VECTOR: ["{x: 1,25, y: 0, z: 0}"],
+    Type.RPY: ["{r: 0, p: 0, y: 1,25}"],
+    Type.POSE: ["{position: {x: 0, y: 1,25, z: 0}}", "{orientation: {r: 1,25e-3, p: 0, y: 0}}"],
+}
+
+
+@pytest.mark.parametrize("listed", [name for name in LISTS if name != "input devices"])
+def test_a_decimal_comma_is_reported_with_what_to_write(listed: str) -> None:
+    keys = [key for key in SCHEMA[LISTS[listed]] if "[]" not in key.path]
+    for key in keys:
+        for value in COMMAS.get(key.type, []):
+            *blocks, last = key.path.split(".")
+            if blocks == ["location"]:  # a vector, which is looked into where it is whole
+                last = f"x: 0, y: 0, z: 0, {last}"
+            text = "".join(f"{block}: {{" for block in blocks) + f"{last}: {value}" + "}" * len(blocks)
+            document = read_text(f"{listed}: [X]\nX: {{name: x, {text}}}\n", Path("m.yaml"), "model")
+            hints = [d.hint for d in document.diagnostics if d.message.startswith("unknown key")]
+            assert any("write a point before '25" in hint for hint in hints), text
+
+
+def test_keys_of_a_position_and_an_orientation_are_checked() -> None:
+    text = BODY + "  location: {position: {x: 0, y: 0, z: 0, Z: 1}, orientation: {r: 0, p: 0, y: 0, r: 1}}\n"
+    assert found(text) == [
+        "5 warning unknown key 'location.position.Z' in body 'BODY a'", "5 warning key 'r' appears twice",
+    ]  # fmt: skip
 
 
 def test_a_joint_without_type_still_lacks_its_other_keys() -> None:

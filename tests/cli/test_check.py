@@ -201,3 +201,13 @@ def test_pictures_that_cannot_be_read_are_reported_whatever_they_are_for(
     (tmp_path / "m.yaml").write_text(yaml.safe_dump({"bodies": ["A"], "A": body}))
     found = [d for d in findings(tmp_path / "m.yaml", [], False) if "not a picture" in d.message]
     assert [d.mark.file for d in found if d.mark] == ([] if share == 1.0 else [picture])
+
+
+def test_what_else_is_wrong_is_reported_where_no_body_is_left(tmp_path: Path) -> None:
+    box = "collision shape: BOX, collision geometry: {x: 0,1, y: 1, z: 1}"
+    (tmp_path / "m.yaml").write_text(f"bodies: [A]\nA: {{name: a, mass: 1, gravty: 0, {box}}}\n")
+    found = findings(tmp_path / "m.yaml", (), strict=False)
+    assert [d.severity for d in found] == [Severity.WARNING, Severity.WARNING, Severity.ERROR]
+    assert [d.hint for d in found][:2] == [
+        "did you mean 'gravity'?", "a comma ends a number; write a point before '1', as in 0.5",
+    ]  # fmt: skip

@@ -7,6 +7,7 @@ leaves out the object, ``range`` where it takes a value that no scene can use.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Collection
 
 from ligature.adf.diagnostics import Diagnostic, Mark, Severity
@@ -24,6 +25,7 @@ MAX_NAMED = 6
 MAX_HINTED = 40
 """Longest unknown key, in characters, for which a known one is looked for."""
 
+_DECIMALS = re.compile(r"[0-9]+([eE][-+]?[0-9]+)?")
 _VECTOR_KEYS = {
     Type.VECTOR: ("x", "y", "z"),
     Type.RPY: ("r", "p", "y"),
@@ -91,7 +93,7 @@ def _check_entry(
     path = prefix + name
     key = None if "." in name or "[" in name else BY_PATH[element.kind].get(path)
     if key is None:
-        found.append(_unknown(name, prefix, key_node.mark, element))
+        found.append(_unknown(name, value, prefix, key_node.mark, element))
     elif key.status is Status.IGNORED:
         message = f"key '{path}' of {element.kind} '{element.key}' has no effect"
         found.append(Diagnostic(Severity.DEBUG, message, key_node.mark, key.doc, "ignored"))
@@ -142,17 +144,29 @@ def _check_converted(key: Key, value: Node, element: Element, found: list[Diagno
 
 def _check_vector(key: Key, value: Mapping, element: Element, found: list[Diagnostic]) -> None:
     """Check keys beside x y z, r p y, position and orientation that the schema has, and report the others."""
-    wanted, known = _VECTOR_KEYS[key.type], BY_PATH[element.kind]
-    found += repeated_keys(value)
+    known = BY_PATH[element.kind]
     for name, (_, beside) in value.entries.items():
-        if name not in wanted and f"{key.path}.{name}" in known:
+        if name not in _VECTOR_KEYS[key.type] and f"{key.path}.{name}" in known:
             _check_value(known[f"{key.path}.{name}"], beside, element, found)
-    unknown = [name for name in value.entries if name not in wanted and f"{key.path}.{name}" not in known]
+    _check_parts(key.path, _VECTOR_KEYS[key.type], value, element, found)
+    if key.type is Type.POSE:
+        for name, parts in (("position", Type.VECTOR), ("orientation", Type.RPY)):
+            half = value.get(name)
+            if isinstance(half, Mapping):
+                _check_parts(f"{key.path}.{name}", _VECTOR_KEYS[parts], half, element, found)
+
+
+def _check_parts(path: str, wanted: tuple[str, ...], value: Mapping, element: Element, found: list[Diagnostic]) -> None:
+    """Report keys of a vector or pose that stand twice, and those that it does not have."""
+    found += repeated_keys(value)
+    known = BY_PATH[element.kind]
+    unknown = [name for name in value.entries if name not in wanted and f"{path}.{name}" not in known]
     if unknown:
-        names = ", ".join(f"'{key.path}.{shortened(name)}'" for name in unknown[:MAX_NAMED])
+        names = ", ".join(f"'{path}.{shortened(name)}'" for name in unknown[:MAX_NAMED])
         more = f" and {len(unknown) - MAX_NAMED} more" if len(unknown) > MAX_NAMED else ""
         message = f"unknown key{'s' if len(unknown) > 1 else ''} {names}{more} in {element.kind} '{element.key}'"
-        hint = f"{key.name} holds {{{', '.join(wanted)}}}"
+        hint = f"{path.rpartition('.')[2]} holds {{{', '.join(wanted)}}}"
+        hint = next(filter(None, (_comma(name, value.entries[name][1]) for name in unknown)), hint)
         found.append(Diagnostic(Severity.WARNING, message, value.entries[unknown[0]][0].mark, hint, "unknown"))
 
 
@@ -182,10 +196,17 @@ def _fault(key: Key, message: str, mark: Mark, hint: str, code: str) -> Diagnost
     return Diagnostic(Severity.ERROR, message, mark, hint, code)
 
 
-def _unknown(name: str, prefix: str, mark: Mark, element: Element) -> Diagnostic:
+def _comma(name: str, value: Node) -> str:
+    """What to write where a key is the digits behind a decimal comma, as in ``{mass: 0,5}``; empty if it is not."""
+    if isinstance(value, Scalar) and value.null and _DECIMALS.fullmatch(name):
+        return f"a comma ends a number; write a point before '{shortened(name)}', as in 0.5"
+    return ""
+
+
+def _unknown(name: str, value: Node, prefix: str, mark: Mark, element: Element) -> Diagnostic:
     siblings = [key.name for key in _CHILDREN[element.kind].get(prefix.rstrip("."), ())]
     message = f"unknown key '{prefix}{shortened(name)}' in {element.kind} '{element.key}'"
     if name == "<<":
         return Diagnostic(Severity.WARNING, message, mark, "merge keys are not part of the format", "unknown")
-    hint = suggestion(name, siblings) or "it has no effect"
+    hint = _comma(name, value) or suggestion(name, siblings) or "it has no effect"
     return Diagnostic(Severity.WARNING, message, mark, hint, "unknown")

@@ -80,7 +80,7 @@ def findings(file: Path, roots: Sequence[Path], strict: bool, models: Sequence[i
     try:
         scene = ligature.load(file, models, roots=roots)
     except ligature.SceneError as error:
-        return list(error.diagnostics)
+        return _distinct([*document.diagnostics, *error.diagnostics])
     later = [
         *reach.findings(scene), *inertias.findings(scene), *guard.findings(scene), *_at_start(scene),
         *_shaders(scene, resolver), *_looks(scene, resolver),
