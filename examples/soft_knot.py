@@ -27,7 +27,7 @@ from ligature.environments.hand import SHUT, Hand
 from ligature.environments.knotting import BEYOND, SLOWEST, Knotter
 from ligature.environments.layout import ACTION
 from ligature.environments.reading import ArmReading
-from ligature.environments.tying import ACROSS, AJAR, AWAY, DRAW, SLOW, Missed
+from ligature.environments.tying import ACROSS, AJAR, AWAY, DRAW, SLOW, WRONG, Missed
 from ligature.model.frames import axis_rotation, frame
 from ligature.model.scene import Body, Scene
 from ligature.robots.psm_arm import PsmArm
@@ -97,8 +97,9 @@ TIMES, LOOKS, MOST = 8, 4, 300
 """How often the knot is slid and locked at most before the hands let go, and how often they do that; actions of a
 slide, of a lock and of easing at most."""
 
-SHORT_END, LONG_END, OFF = slice(15, 35), slice(-45, -15), 0.03
-"""Elements between which a hand takes an end again that it has lost; metres by which it goes back before."""
+SHORT_END, LONG_END, OFF, FARTHEST = slice(15, 35), slice(-45, -15), 0.03, 1.0
+"""Elements between which a hand takes an end again that it has lost; metres by which it goes back before; metres as
+which an element counts that was missed."""
 
 DISPLACED = np.array([-0.0015, 0.0010, 0.0])
 """Where the first throw then lies, from where it would lie at the vessel."""
@@ -164,6 +165,11 @@ class Knotting(Knotter):
     IN, SHARE = 0.012, 0.45
     """Taken so near, and through the loop so far from the tissue, that the left tool does not lean over the pad; of a
     small loop no further than this share of its length."""
+
+    def __init__(self, hand: Hand) -> None:
+        super().__init__(hand)
+        self.missed: list[int] = []
+        """Elements that a hand has missed since one was taken again."""
 
     def bring(self) -> Iterator[Array]:
         """As ever, with the free end where the left hand can take it."""
@@ -251,7 +257,8 @@ class Knotting(Knotter):
     def regain(self, number: int, among: slice) -> Iterator[Array]:
         """A hand that holds nothing goes back, and takes, turned as it is, what is nearest of some elements.
 
-        Where it missed that, it takes what is also near to being aligned with its jaws: wrists turn only so far.
+        Where it missed that, it takes others, and such as are near to being aligned with its jaws: wrists turn only
+        so far, and what lies in the way of the jaws lies there.
         """
         if self.goal.held(number) is not None:
             return
@@ -260,8 +267,12 @@ class Knotting(Knotter):
         away = np.linalg.norm(points[elements] - (T[:3, 3] + DEEP * T[:3, 2]), axis=1)
         aligned = np.abs(tangents @ T[:3, 0]) / np.linalg.norm(tangents, axis=1)
         cost = away / np.maximum(aligned, 0.05) ** (2 * self.further // self.FURTHER)
+        for element in self.missed:
+            cost[np.abs(elements - element) <= WRONG] += FARTHEST
+        self.missed.append(int(elements[cost.argmin()]))
         yield from self.go(number, drawn_back(T, OFF), AJAR, SLOW)
-        yield from self.take(number, T[:3, 2], int(elements[cost.argmin()]))
+        yield from self.take(number, T[:3, 2], self.missed[-1])
+        self.missed.clear()
 
     def slide(self, goal: Sewn, most: float) -> Iterator[Array]:
         """The left hand draws the short end, while the right one keeps the long end just taut: the knot does not lock.
