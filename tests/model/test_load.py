@@ -122,8 +122,8 @@ def test_a_part_of_a_name_is_reported_with_the_body_that_it_stands_for(lab, kind
         scene = lab(m=bodies("Base", "tip") + f"{kind}: [X]\nX: {{name: x, parent: '{text}', {content}}}\n")
         (made,) = getattr(scene, kind)
         assert made.parent == 0
-        told = f"parent '{text}' of {kind[:-1]} 'X' is incomplete; using '{whole}'" in reported(scene, Severity.INFO)
-        assert told == (not text.endswith("BODY Base"))
+        warned = f"parent '{text}' of {kind[:-1]} 'X' is incomplete; using '{whole}'" in reported(scene, Severity.INFO)
+        assert warned == (not text.endswith("BODY Base"))
 
 
 def test_a_chain_commands_its_joints_from_base_to_tip(lab) -> None:
