@@ -42,6 +42,9 @@ APPROACH = ((0.052, 1.0), (0.026, 1.0), (0.010, 0.6))
 DRAWN = ((-0.016, -0.002, 0.014, 0.25), (-0.066, -0.020, 0.020, 1.2))
 """Where the left hand draws the throw, one place after the other, from the vessel, and newtons with which it stops."""
 
+CYCLE = 3
+"""Tries after which it takes the thread as near to the other one again as at first: the end is not far."""
+
 WRONG = 4
 """Elements from the one that it was to take at which a hand has taken another strand."""
 
@@ -83,7 +86,7 @@ class Tier:
     """How far from the vessel the left tool reaches down through the loop."""
 
     FURTHER = 0
-    """Elements by which a hand takes the thread further from the other one each time, of three, that it missed it."""
+    """Elements by which a hand takes the thread further from the other one each time that it missed it."""
 
     TRIES = 3
     """How often a hand tries to take the thread from the other one at most."""
@@ -103,7 +106,7 @@ class Tier:
     def tries(self, number: int, *steps: Callable[[], Iterator[Array]]) -> Iterator[Array]:
         """Steps at whose end a hand takes the thread from the other one; where it missed that, they are made again."""
         for count in range(self.TRIES):
-            self.further = count % 3 * self.FURTHER
+            self.further = count % CYCLE * self.FURTHER
             try:
                 for step in steps:
                     yield from step()
