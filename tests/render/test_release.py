@@ -165,7 +165,7 @@ def test_exposures_show_the_moment_they_began_in_whatever_comes_before_they_are_
 
 def test_pictures_of_many_sizes_keep_a_bounded_number_of_frame_buffers(scene: Path) -> None:
     simulation = Simulation(ligature.load(scene))
-    renderer, camera = Renderer(simulation.scene), simulation.scene.cameras[0]
+    renderer, camera = Renderer(simulation.scene, samples=0), simulation.scene.cameras[0]
     for width in (40, *range(8, 8 + 2 * MAX_TARGETS), 40):
         view = view_of(camera, simulation.state["camera_world"][0, 0], (width, 30))
         assert renderer.render(simulation.state, view).rgb.shape == (30, width, 3)

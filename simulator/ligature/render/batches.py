@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 import moderngl
 import numpy as np
@@ -49,7 +49,7 @@ class Batch:
         self._tangents = surface.normal_map is not None
         self._instances = context.buffer(reserve=len(pieces) * INSTANCE.itemsize, dynamic=True)
         self._before = context.buffer(reserve=len(pieces) * 64, dynamic=True)
-        self._arrays: dict[Program, moderngl.VertexArray] = {}
+        self._arrays: dict[tuple[Program, bool], moderngl.VertexArray] = {}
         self._loaded: Triangles | None = None
         self._legacy: LegacyBuffers | None = None
         self._past: moderngl.Buffer | None = None
@@ -65,6 +65,7 @@ class Batch:
             self._indices = self._context.buffer(
                 np.ascontiguousarray(triangles.faces, dtype="i4").tobytes() or bytes(4)
             )
+            self._some: moderngl.Buffer | None = None
             self._arrays, self._legacy = {}, None
         else:
             self._vertices.write(data)
@@ -90,12 +91,27 @@ class Batch:
         else:
             self._past.write(data)
 
-    def draw(self, program: Program, instances: NDArray[np.void], before: NDArray[np.float32] | None = None) -> None:
-        """Draw ``instances`` (n,) of `INSTANCE`; ``before`` (n, 4, 4) are their matrices one frame ago."""
+    def draw(
+        self,
+        program: Program,
+        instances: NDArray[np.void],
+        before: NDArray[np.float32] | None = None,
+        faces: NDArray[np.int32] | None = None,
+    ) -> None:
+        """Draw ``instances`` (n,) of `INSTANCE`; ``before`` (n, 4, 4) are their matrices one frame ago.
+
+        ``faces`` (m, 3) are those of the triangles that are to be drawn, all when not given.
+        """
         self._instances.write(instances.tobytes())
         if before is not None:
             self._before.write(before.tobytes())
-        self.array(program).render(instances=len(instances))
+        if faces is None:
+            self.array(program).render(instances=len(instances))
+            return
+        if self._some is None:
+            self._some = self._context.buffer(reserve=self._indices.size, dynamic=True)
+        self._some.write(faces.tobytes())
+        self.array(program, self._some).render(instances=len(instances), vertices=faces.size)
 
     def legacy(self, program: Program) -> moderngl.VertexArray:
         """The buffers bound to the attributes of a scene file's ``program``, which draws one piece at a time."""
@@ -104,9 +120,10 @@ class Batch:
             self._legacy = LegacyBuffers(self._context, triangles)
         return self._legacy.array(program)
 
-    def array(self, program: Program) -> moderngl.VertexArray:
-        """The buffers bound to the attributes that ``program`` reads."""
-        if program not in self._arrays:
+    def array(self, program: Program, indices: moderngl.Buffer | None = None) -> moderngl.VertexArray:
+        """The buffers bound to the attributes that ``program`` reads, with all faces or those in ``indices``."""
+        key = program, indices is None
+        if key not in self._arrays:
             known = program.attributes
             wanted = [(name, size) for name, size in _VERTEX if name != "aTangent" or self._tangents]
             vertex = " ".join(f"{size}f" if name in known else f"{4 * size}x" for name, size in wanted)
@@ -120,8 +137,8 @@ class Batch:
             if "aBefore" in known and self._past is not None:
                 content.append((self._past, "3f", "aBefore"))
             linked = program.linked
-            self._arrays[program] = self._context.vertex_array(linked, content, index_buffer=self._indices)
-        return self._arrays[program]
+            self._arrays[key] = self._context.vertex_array(linked, content, index_buffer=indices or self._indices)
+        return self._arrays[key]
 
 
 class Instances:
@@ -143,6 +160,12 @@ class Instances:
     def still(self) -> NDArray[np.bool_]:
         """Which instances stand still."""
         return self._stayed > STILL_AFTER
+
+    @property
+    def standing(self) -> Hashable:
+        """What stands still, and where."""
+        still = self.still
+        return still.tobytes(), self.T_world_piece[still].tobytes()
 
     def place(self, T_world_owner: Array) -> None:
         """Move everything along with its owners (n, 4, 4)."""

@@ -53,9 +53,38 @@ def tidy(context: moderngl.Context) -> moderngl.Context:
 
 def finish_of(context: moderngl.Context) -> Callable[[], None]:
     """What waits until all is drawn; other threads of Python run meanwhile, which they do not in moderngl's calls."""
+    return _function(context, "glFinish") or context.finish
+
+
+DepthCopy = Callable[[moderngl.Framebuffer, moderngl.Framebuffer], None]
+"""Copies the depths of the first frame buffer to the second, which is in use and as large."""
+
+
+def depth_copier(context: moderngl.Context) -> DepthCopy | None:
+    """What copies depths, where moderngl copies colours alone; None where the driver's functions cannot be called."""
+    integers = (ctypes.c_uint,)
+    bind = _function(context, "glBindFramebuffer", *2 * integers)
+    blit = _function(context, "glBlitFramebuffer", *8 * (ctypes.c_int,), *2 * integers)
+    if bind is None or blit is None:
+        return None
+
+    def copy(source: moderngl.Framebuffer, target: moderngl.Framebuffer) -> None:
+        bind(READ_FRAMEBUFFER, source.glo)
+        blit(0, 0, *source.size, 0, 0, *target.size, DEPTH_BUFFER_BIT, NEAREST)
+        bind(READ_FRAMEBUFFER, target.glo)
+
+    return copy
+
+
+READ_FRAMEBUFFER, DEPTH_BUFFER_BIT, NEAREST = 0x8CA8, 0x100, 0x2600
+"""Constants of OpenGL's registry."""
+
+
+def _function(context: moderngl.Context, name: str, *types: type) -> Callable[..., None] | None:
+    """A function of OpenGL that returns nothing; None where it cannot be called."""
     load = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
-    address = load("glFinish") if load else 0
-    return ctypes.CFUNCTYPE(None)(address) if address else context.finish
+    address = load(name) if load else 0
+    return ctypes.CFUNCTYPE(None, *types)(address) if address else None
 
 
 SOFTWARE = ("llvmpipe", "softpipe", "swr", "software")

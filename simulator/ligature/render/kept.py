@@ -9,8 +9,8 @@ would be the same to the last bit.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import moderngl
@@ -18,13 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ligature.render.batches import Batch, Instances
+from ligature.render.context import DepthCopy
 from ligature.render.lights import Lights, ShadowView
-from ligature.render.stirred import cells_of, chosen, stir, stirred_cells
+from ligature.render.stirred import Readers, box_of, cells_of, far_at, stir, stirred_cells
 from ligature.render.target import Target
 
 MOST, MOST_PIXELS = 8, 4_200_000
-"""Pictures that are kept, of all cameras together, and their pixels, of which each takes 20 bytes; with more cameras
+"""Pictures that are kept, of all cameras together, and their pixels, of which each takes 28 bytes; with more cameras
 that take turns, none would be there any more when it is needed, and none is kept."""
+
+MARKED = ("places", "facets")
+"""Further passes of a picture that is kept: where it reads the shadow maps, and which facet is seen."""
+
+NO_PIXELS = np.zeros(0, dtype=np.int32)
 
 Draw = Callable[[Target, moderngl.Framebuffer], None]
 
@@ -33,32 +39,82 @@ Box = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
-    """A picture of ``batches`` alone: what is in a target's textures, and which cell of each shadow map a pixel reads.
+class Begun:
+    """How a picture begins: with batches that are ``kept``.
 
-    ``depths`` (h, w) and ``cells`` (h, w) for each shadow map count rows upwards.
+    Of these, the faces that ``again`` has for a batch are to be drawn again in a ``box``.
+    """
+
+    kept: frozenset[Batch] = frozenset()
+    again: Mapping[Batch, NDArray[np.int32]] = field(default_factory=dict)
+    box: Box | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """What a picture of batches shows in each pixel.
+
+    ``numbers`` (h, w) are those of the facets, -1 for none: those of a batch in ``spans``, which begins and counts a
+    number for each face and instance.
+    """
+
+    numbers: NDArray[np.int32]
+    spans: Mapping[Batch, tuple[int, int]]
+
+    @classmethod
+    def of(cls, read: NDArray[np.float32], batches: Iterable[Batch], rows: int) -> Facets:
+        """Take them from what is ``read`` (h, w, 2) of the pass; there are ``rows`` instances in all."""
+        first, spans, count = np.full(rows + 1, -1, dtype=np.int64), {}, 0
+        for batch in batches:
+            faces, instances = len(batch.triangles.faces), len(batch.pieces)
+            first[batch.rows.start + 1 : batch.rows.stop + 1] = count + faces * np.arange(instances)
+            spans[batch] = (count, faces * instances)
+            count += faces * instances
+        start = first[read[..., 0].astype(np.int64)]
+        numbers = np.where(start < 0, -1, start + read[..., 1].astype(np.int64))
+        return cls(numbers.astype(np.int32), spans)
+
+    def faces(self, batch: Batch, drawn: NDArray[np.bool_]) -> NDArray[np.int32]:
+        """The faces (m, 3) of ``batch`` of which some instance is ``drawn``, by numbers."""
+        begin, count = self.spans[batch]
+        some = drawn[begin : begin + count].reshape(len(batch.pieces), -1).any(axis=0)
+        return np.ascontiguousarray(batch.triangles.faces[some], dtype=np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """A picture of ``batches`` alone: what is in a target's textures, and which pixels read a cell of each shadow map.
+
+    ``depths`` (h, w), which ``buffer`` holds, and ``facets`` count rows upwards.
     """
 
     batches: frozenset[Batch]
     contents: dict[str, NDArray[Any]]
     depths: NDArray[np.float32]
-    cells: tuple[NDArray[np.int32], ...]
+    buffer: moderngl.Framebuffer
+    readers: tuple[Readers, ...]
+    facets: Facets
 
-    def begin(self, target: Target, stirred: Sequence[NDArray[np.uint8]]) -> Box | None:
-        """Begin a picture with this one; returns where it is still to be drawn, about the cells that are ``stirred``.
+    def begin(self, target: Target, stirred: Sequence[NDArray[np.uint8]], copy: DepthCopy | None) -> Begun:
+        """Begin a picture with this one; returns what is still to be drawn, about the cells that are ``stirred``.
 
         Pixels that read such a cell are given the greatest depth.
         """
-        depths, box = self.depths, None
-        for cells, places in zip(stirred, self.cells, strict=True):
-            depths, (left, low, right, high) = chosen(depths, places, cells.reshape(-1))
-            if left <= right:
-                corner = (left, low, right, high) if box is None else (
-                    min(left, box[0]), min(low, box[1]), max(right, box[2]), max(high, box[3])
-                )  # fmt: skip
-                box = corner
-        target.fill(self.contents, depths)
-        return None if box is None else (box[0], box[1], box[2] - box[0] + 1, box[3] - box[1] + 1)
+        read = [readers.of(cells) for cells, readers in zip(stirred, self.readers, strict=True)]
+        pixels = np.concatenate([NO_PIXELS, *read])
+        drawn = np.zeros(sum(count for _, count in self.facets.spans.values()), dtype=np.bool_)
+        box = box_of(pixels, self.facets.numbers, drawn)
+        target.fill(self.contents)
+        if copy is None:
+            target.fill_depths(self.depths, 0, 0)
+        else:
+            target.whole.use()
+            copy(self.buffer, target.whole)
+        if not len(pixels):
+            return Begun(self.batches)
+        target.fill_depths(far_at(pixels, self.depths, box), *box[:2])
+        faces = ((batch, self.facets.faces(batch, drawn)) for batch in self.batches)
+        return Begun(self.batches, {batch: some for batch, some in faces if len(some)}, box)
 
 
 class Keeper:
@@ -99,22 +155,26 @@ class Keeper:
             _add(self._seen_once, key, None, slots)
             return None
         del self._seen_once[key]
-        places = self._context.texture(target.size, 4, dtype="f4")
-        blank = Target(self._context, target.size, target.passes, 0)
-        draw(blank, blank.with_places(places))
         width, height = target.size
-        read = np.frombuffer(places.read(), dtype="f4").reshape(height, width, 4)
-        cells = tuple(
-            cells_of(read[..., 2 * k : 2 * k + 2], shadow.size) for k, shadow in enumerate(self._lights.shadow_views)
+        textures = [self._context.texture(target.size, channels, dtype="f4") for channels in (4, 2)]
+        blank = Target(self._context, target.size, target.passes, 0)
+        draw(blank, blank.with_more(*textures))
+        places, seen = (np.frombuffer(t.read(), dtype="f4").reshape(height, width, -1) for t in textures)
+        readers = tuple(
+            Readers(cells_of(places[..., 2 * k : 2 * k + 2], shadow.size), shadow.size)
+            for k, shadow in enumerate(self._lights.shadow_views)
         )
-        kept = Kept(keepable, blank.contents(), blank.depths().copy(), cells)  # `chosen` takes what can be written
+        facets = Facets.of(seen, keepable, len(instances.ids))
+        depths = blank.depths()
+        # a texture of its own: Mesa waits for all that is being drawn before it copies what was once drawn into
+        buffer = self._context.framebuffer(depth_attachment=self._context.depth_texture(target.size, depths.tobytes()))
+        kept = Kept(keepable, blank.contents(), depths, buffer, readers, facets)
         _add(self._kept, key, kept, slots)
         return kept
 
     def _standing(self, instances: Instances) -> Hashable:
         """Where everything stands that stands still, and all that the lights do."""
-        still = instances.still
-        return still.tobytes(), instances.T_world_piece[still].tobytes(), self._lights.content()
+        return instances.standing, self._lights.content()
 
     def stirred(self, moment: bytes, casters: Sequence[Batch], instances: Instances) -> list[NDArray[np.uint8]]:
         """The cells of each shadow map that those of ``casters`` that move at ``moment`` may reach; once for it."""
@@ -131,7 +191,7 @@ class Keeper:
                 triangles = batch.triangles
                 for T_world_piece in instances.T_world_piece[batch.rows]:
                     to_clip = (shadow.projection @ shadow.view @ T_world_piece)[[0, 1, 3]]
-                    stir(cells, triangles.positions @ to_clip[:, :3].T + to_clip[:, 3], triangles.faces)
+                    stir(cells, to_clip, triangles.positions, triangles.faces)
         return self._stirred[key]
 
 

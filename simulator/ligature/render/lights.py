@@ -17,10 +17,14 @@ from numpy.typing import NDArray
 from ligature.model.frames import inverse
 from ligature.model.scene import Light, Scene
 from ligature.render.camera import perspective
+from ligature.render.context import depth_copier
 from ligature.render.programs import Program
 
 Array = NDArray[np.float64]
 Sphere = tuple[Array, float]
+
+Cast = Callable[["ShadowView", bool], None]
+"""Draws the casters of a shadow map: those that stand still, or those that move."""
 
 MAX_LIGHTS, MAX_SHADOWS = 8, 2
 SHADOW_SIZES = (0, 256, 512, 1024, 2048, 4096)
@@ -131,19 +135,18 @@ class Lights:
                 view, projection = light_camera(settings, self._T_world_light[index], *sphere)
                 self.shadow_views.append(ShadowView(index, settings.shadow_size, view, projection))
 
-    def cast(self, draw: Callable[[ShadowView], None], view: Array, moment: bytes) -> None:
-        """Draw the shadow maps, once for each ``moment``, which is all that moves; ``draw`` draws every caster."""
+    def cast(self, draw: Cast, view: Array, standing: Hashable, moment: bytes | None) -> None:
+        """Draw the shadow maps, once for each ``moment`` at which casters move, and what stands still once.
+
+        ``standing`` names all that stands still. Without a ``moment``, that alone casts shadows.
+        """
         self._shadows = []
         for aimed in self.shadow_views:
             key = aimed.index, aimed.size
             if key not in self._maps:
                 self._maps[key] = _ShadowMap(self._context, aimed.size)
             shadow = self._maps[key]
-            content = (moment, aimed.view.tobytes(), aimed.projection.tobytes())
-            if shadow.content != content:
-                shadow.use()
-                draw(aimed)
-                shadow.content = content
+            shadow.show(aimed, draw, standing, moment)
             self._shadows.append((aimed.index, shadow, TO_TEXTURE @ aimed.projection @ aimed.view @ inverse(view)))
             shadow.spread = 2.0 / (abs(aimed.projection[0, 0]) * aimed.size)
 
@@ -205,20 +208,42 @@ def _step(distance: float, towards: Callable[[float], float]) -> float:
 
 
 class _ShadowMap:
-    """Depth texture that is compared with while it is sampled."""
+    """Depth texture that is compared with while it is sampled, and another one of what stands still."""
 
     def __init__(self, context: moderngl.Context, size: int) -> None:
         self.size = size
         self.spread = 0.0
-        self.content: tuple[bytes, ...] = ()
-        """What it was last drawn of."""
-        self.texture = context.depth_texture((size, size))
+        self.texture, self._still = (context.depth_texture((size, size)) for _ in range(2))
         self.texture.compare_func = "<="
         self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.texture.repeat_x = self.texture.repeat_y = False
-        self._buffer = context.framebuffer(depth_attachment=self.texture)
+        self._whole, self._standing = (context.framebuffer(depth_attachment=t) for t in (self.texture, self._still))
+        self._copy = depth_copier(context)
+        self._shows: tuple[Hashable, ...] = ()
+        self._stands: tuple[Hashable, ...] = ()
 
-    def use(self) -> None:
-        """Make it current and empty."""
-        self._buffer.use()
-        self._buffer.clear()
+    def show(self, aimed: ShadowView, draw: Cast, standing: Hashable, moment: bytes | None) -> None:
+        """Have it show what stands still, and what moves at a ``moment``."""
+        stands = standing, aimed.view.tobytes(), aimed.projection.tobytes()
+        if self._shows == (moment, *stands):
+            return
+        if self._copy is None:
+            self._whole.use()
+            self._whole.clear()
+            draw(aimed, True)
+        else:
+            self._begin(aimed, draw, stands)
+        if moment is not None:
+            draw(aimed, False)
+        self._shows = moment, *stands
+
+    def _begin(self, aimed: ShadowView, draw: Cast, stands: tuple[Hashable, ...]) -> None:
+        """Begin with what stands still, which is drawn when it is another than before."""
+        assert self._copy is not None
+        if self._stands != stands:
+            self._standing.use()
+            self._standing.clear()
+            draw(aimed, True)
+            self._stands = stands
+        self._whole.use()
+        self._copy(self._standing, self._whole)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Hashable, Iterable, Sequence
 
 import moderngl
 import numpy as np
@@ -14,7 +14,7 @@ from ligature.model.state import MAX_PUNCTURES
 from ligature.render import legacy
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
-from ligature.render.kept import Box, is_still
+from ligature.render.kept import MARKED, Begun, is_still
 from ligature.render.lights import Lights
 from ligature.render.programs import Program, Programs
 from ligature.render.sky import Sky
@@ -39,6 +39,7 @@ class Brushes:
         self._context, self._programs, self.textures, self.lights = context, programs, textures, lights
         self._resolver, self._problems = resolver, problems
         self._own: dict[ShaderFiles, Program | None] = {}
+        self._built_in: dict[Hashable, Program] = {}
 
     def prepare(self, shaders: Iterable[ShaderFiles | None]) -> None:
         """Compile programs of scene files, so that what is wrong with them is known before the first picture."""
@@ -58,6 +59,15 @@ class Brushes:
 
     def built_in(self, batch: Batch, passes: Sequence[str]) -> Program:
         """The program that writes ``passes`` of ``batch``; colour alone is drawn by facets, with smooth edges."""
+        rays = None if batch.rays is None else batch.rays.opaque
+        kind = batch.surface.defines, batch.marks is None, batch.deforms, rays, batch.primitive and batch.primitive[0]
+        key = tuple(passes), tuple(self.lights.defines.values()), kind
+        if key not in self._built_in:
+            self._built_in[key] = self._programs.get("surface", self._defines(batch, passes))
+        return self._built_in[key]
+
+    def _defines(self, batch: Batch, passes: Sequence[str]) -> dict[str, int]:
+        """Features of the shaders that write ``passes`` of ``batch``."""
         defines = {f"PASS_{name.upper()}": place for place, name in enumerate(passes)} | {"LIGHTS": 1}
         if "rgb" in passes:
             defines |= self.lights.defines | dict.fromkeys(batch.surface.defines, 1)
@@ -67,9 +77,9 @@ class Brushes:
             defines["DEFORMS"] = 1
         if batch.rays is not None:
             defines |= batch.rays.defines
-        if batch.primitive is not None and set(passes) - {"places"} != {"rgb"}:
+        if batch.primitive is not None and set(passes) - set(MARKED) != {"rgb"}:
             defines["ANALYTIC"] = batch.primitive[0]
-        return self._programs.get("surface", defines)
+        return defines
 
 
 class Painter:
@@ -88,8 +98,7 @@ class Painter:
         self._before = before
         self.behind: moderngl.Texture | None = None
         """Depth of all that is opaque, for the colours of volumes with a transfer function."""
-        self._kept: frozenset[Batch] = frozenset()
-        self._box: Box | None = None
+        self._begun = Begun()
         self._ready: set[Program] = set()
         self._calls = [(batch, rows) for batch in batches if len(rows := seen.rows(batch))]
 
@@ -103,9 +112,9 @@ class Painter:
         own = self._brushes.own
         return any(not b.opaque or own(shaders) or own(b.shaders) for b, _ in self._calls)
 
-    def begin_with(self, kept: frozenset[Batch], box: Box | None) -> None:
-        """Draw what is ``kept``, with which the picture begins, in ``box`` alone, and nowhere when that is None."""
-        self._kept, self._box = kept, box
+    def begin_with(self, begun: Begun) -> None:
+        """Draw what is kept, with which the picture begins, only where it is to be drawn again."""
+        self._begun = begun
 
     def keepable(self, instances: Instances) -> frozenset[Batch]:
         """Batches in the picture that look as before until something throws a shadow on them."""
@@ -163,14 +172,21 @@ class Painter:
         buffer.use()
         opaque = [(batch, rows) for batch, rows in self._calls if batch.opaque and (only is None or batch in only)]
         for batch, rows in sorted(opaque, key=lambda call: float(self._seen.depth[call[1]].min())):
-            if batch not in self._kept:
+            if batch not in self._begun.kept:
                 self._draw(batch, passes, rows, shaders)
-            elif self._box is not None:
-                buffer.scissor = self._box
-                self._draw(batch, passes, rows, shaders)
+            elif (faces := self._begun.again.get(batch)) is not None:
+                buffer.scissor = self._begun.box  # type: ignore[assignment]
+                self._draw(batch, passes, rows, shaders, faces)
                 buffer.scissor = None  # type: ignore[assignment]
 
-    def _draw(self, batch: Batch, passes: Sequence[str], rows: NDArray[np.int64], shaders: ShaderFiles | None) -> None:
+    def _draw(
+        self,
+        batch: Batch,
+        passes: Sequence[str],
+        rows: NDArray[np.int64],
+        shaders: ShaderFiles | None,
+        faces: NDArray[np.int32] | None = None,
+    ) -> None:
         (self._context.enable if batch.closed else self._context.disable)(moderngl.CULL_FACE)
         if "rgb" in passes:
             own = self._brushes.own(shaders) or self._brushes.own(batch.shaders)
@@ -190,7 +206,8 @@ class Painter:
             bind_surface(program, batch.surface, self._brushes.textures)
             if batch.marks is not None:
                 bind_marks(program, batch.marks, self._view.view)
-        batch.draw(program, self._seen.instances[rows], None if self._before is None else self._before[rows])
+        before = None if self._before is None else self._before[rows]
+        batch.draw(program, self._seen.instances[rows], before, faces)
 
     def _bind_picture(self, program: Program, passes: Sequence[str]) -> None:
         """Fill the uniforms of a built-in program that are the same for the whole picture."""

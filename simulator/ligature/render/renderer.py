@@ -21,8 +21,8 @@ from ligature.model.scene import Scene
 from ligature.model.shapes import ShaderFiles
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
-from ligature.render.context import create_context, draws_on_processor, finish_of
-from ligature.render.kept import Keeper, Kept
+from ligature.render.context import create_context, depth_copier, draws_on_processor, finish_of
+from ligature.render.kept import MARKED, Keeper, Kept, is_still
 from ligature.render.lights import Lights, LightSettings, ShadowView
 from ligature.render.look import Look, brighter, tinted
 from ligature.render.movement import Movement
@@ -86,7 +86,7 @@ class Renderer:
         self._context = context or create_context()
         self._end = None if context else weakref.finalize(self, self._context.release)
         _alive.add(self)
-        self._finish = finish_of(self._context)
+        self._finish, self._copy = finish_of(self._context), depth_copier(self._context)
         self._smoothed = samples is None and draws_on_processor(self._context)
         wanted = SAMPLES if samples is None else samples
         self._samples = 0 if self._smoothed else min(wanted, self._context.max_samples)
@@ -206,8 +206,9 @@ class Renderer:
         with self._context:
             self._finish()  # reading would wait as well, and hold up all other threads meanwhile
             readings = target.read()
-            self._targets.append(target)  # the newest come last
-            del self._targets[:-MAX_TARGETS]
+            if not self._smoothed:  # Mesa would wait for all that is being drawn before it writes to them again
+                self._targets.append(target)  # the newest come last
+                del self._targets[:-MAX_TARGETS]
         return partial(developed, readings, colours)
 
     def _drawn(
@@ -224,6 +225,10 @@ class Renderer:
         painter = Painter(self._context, self._brushes, self._batches, seen, view, before)
         apart = bool(self._samples) or painter.needs_colour_apart(shaders)
         kept = self._kept(painter, target, view, casts) if self._smoothed and not shaders and not apart else None
+        if kept is not None:  # before shadows are cast: what is drawn would have to be finished first
+            casters = [batch for batch in self._batches if batch.surface.opaque]
+            stirred = self._keeper.stirred(moment, casters, self._instances)
+            painter.begin_with(kept.begin(target, stirred, self._copy))
         if casts:
             self._cast_shadows(view, moment)
         self.drawn_triangles = painter.triangles
@@ -236,10 +241,6 @@ class Renderer:
         sky = self._sky if shaders is None else None
         if kept is None:
             target.clear(BACKGROUND, apart)
-        else:
-            casters = [batch for batch in self._batches if batch.surface.opaque]
-            stirred = self._keeper.stirred(moment, casters, self._instances)
-            painter.begin_with(kept.batches, kept.begin(target, stirred))
         if target.colour is not None and apart:
             painter.paint(target.colour, ["rgb"], shaders, sky)
             if target.geometry is not None:
@@ -351,10 +352,10 @@ class Renderer:
 
         def draw(blank: Target, buffer: moderngl.Framebuffer) -> None:
             if casts:
-                self._cast_shadows(view, b"", self._instances.still)
+                self._cast_shadows(view, None)
             buffer.clear()
             blank.clear(BACKGROUND, apart=False)
-            painter.paint_opaque(buffer, [*target.passes, "places"], only=keepable)
+            painter.paint_opaque(buffer, [*target.passes, *MARKED], only=keepable)
 
         picture = view.view.tobytes(), view.projection.tobytes()
         return self._keeper.kept(target, picture, keepable, self._instances, draw)
@@ -369,24 +370,23 @@ class Renderer:
         self._lights.aim(scene, self._instances.around(near))
         return True
 
-    def _cast_shadows(self, view: CameraView, moment: bytes, casters: NDArray[np.bool_] | None = None) -> None:
-        """Draw the shadow maps of the state at ``moment``, or of instances that are ``casters`` alone."""
+    def _cast_shadows(self, view: CameraView, moment: bytes | None) -> None:
+        """Draw the shadow maps of the state at ``moment``, or without one, of what stands still."""
         context = self._context
         context.enable_only(moderngl.DEPTH_TEST)
         context.polygon_offset = (1.5, 2.0)
-        self._lights.cast(partial(self._draw_shadow, casters), view.view, moment)
+        self._lights.cast(self._draw_shadows, view.view, self._instances.standing, moment)
         context.polygon_offset = (0.0, 0.0)
 
-    def _draw_shadow(self, casters: NDArray[np.bool_] | None, shadow: ShadowView) -> None:
+    def _draw_shadows(self, shadow: ShadowView, still: bool) -> None:
+        """Draw what casts shadows and stands still, or moves."""
         view, projection = shadow.view, shadow.projection
         meshes = self._programs.get("shadow", {})
         meshes.write("uProjection", projection)
         seen = self._instances.seen(view, projection, shadow.size, COARSE_BELOW)
         for batch in self._batches:
             rows = seen.rows(batch)
-            if casters is not None and (batch.rays is not None or not casters[batch.rows].all()):
-                continue
-            if not len(rows) or not batch.surface.opaque:
+            if not len(rows) or not batch.surface.opaque or is_still(batch, self._instances) is not still:
                 continue
             if batch.rays is None:
                 batch.draw(meshes, seen.instances[rows])

@@ -26,12 +26,14 @@ def stirred_cells(size: int) -> NDArray[np.uint8]:
     return np.zeros((size // CELL, size // CELL), dtype=np.uint8)
 
 
-def stir(cells: NDArray[np.uint8], clip: NDArray[np.float64], faces: NDArray[np.int32]) -> None:
-    """Set those of ``cells`` to 255 at whose look-ups ``faces`` (m, 3) of the points ``clip`` may be met.
+def stir(
+    cells: NDArray[np.uint8], to_clip: NDArray[np.float64], points: NDArray[np.float64], faces: NDArray[np.int32]
+) -> None:
+    """Set those of ``cells`` to 255 at whose look-ups ``faces`` (m, 3) of ``points`` (n, 3) may be met.
 
-    ``clip`` (n, 3) are x, y and w of the light's clip coordinates.
+    ``to_clip`` (3, 4) leads from the points to x, y and w of the light's clip coordinates.
     """
-    _stir(cells, clip, faces, MARGIN / CELL)
+    _stir(cells, np.ascontiguousarray(to_clip), points, faces, MARGIN / CELL)
 
 
 def cells_of(places: NDArray[np.float32], size: int) -> NDArray[np.int32]:
@@ -46,33 +48,78 @@ def cells_of(places: NDArray[np.float32], size: int) -> NDArray[np.int32]:
     return np.where(inside, rows * edge + columns, -1).astype(np.int32)
 
 
-@compiled
-def chosen(
-    depths: NDArray[np.float32], places: NDArray[np.int32], cells: NDArray[np.uint8]
-) -> tuple[NDArray[np.float32], tuple[int, int, int, int]]:
-    """``depths`` (h, w) with 1 in all pixels whose ``places`` are cells that are set, and where these pixels lie.
+class Readers:
+    """Which pixels read each cell of a shadow map: those of cell c are ``pixels[starts[c] : starts[c + 1]]``."""
 
-    That is by their least and greatest x and y; where there are none, the greatest are less than the least.
+    def __init__(self, cells: NDArray[np.int32], size: int) -> None:
+        numbers = cells.reshape(-1)
+        order = np.argsort(numbers, kind="stable").astype(np.int32)
+        outside = int((numbers < 0).sum())
+        self.pixels = order[outside:]
+        self.starts = np.searchsorted(numbers[self.pixels], np.arange((size // CELL) ** 2 + 1)).astype(np.int32)
+
+    def of(self, cells: NDArray[np.uint8]) -> NDArray[np.int32]:
+        """The pixels that read those of ``cells`` that are set."""
+        return _readers(self.pixels, self.starts, cells.reshape(-1))
+
+
+@compiled
+def _readers(pixels: NDArray[np.int32], starts: NDArray[np.int32], cells: NDArray[np.uint8]) -> NDArray[np.int32]:
+    count = 0
+    for cell in range(len(cells)):
+        if cells[cell]:
+            count += starts[cell + 1] - starts[cell]
+    found, at = np.empty(count, dtype=np.int32), 0
+    for cell in range(len(cells)):
+        if cells[cell]:
+            for k in range(starts[cell], starts[cell + 1]):
+                found[at] = pixels[k]
+                at += 1
+    return found
+
+
+@compiled
+def box_of(pixels: NDArray[np.int32], facets: NDArray[np.int32], drawn: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """The least x and y of ``pixels`` of a picture, how wide they lie and how high; 0 where there are none.
+
+    Sets ``drawn`` for their ``facets`` (h, w), of which -1 is none.
     """
-    height, width = depths.shape
-    found = np.empty_like(depths)
+    height, width = facets.shape
     left, low, right, high = width, height, -1, -1
-    for y in range(height):
-        for x in range(width):
-            place = places[y, x]
-            if place >= 0 and cells[place]:
-                found[y, x] = 1.0
-                left, right, low, high = min(left, x), max(right, x), min(low, y), y
-            else:
-                found[y, x] = depths[y, x]
-    return found, (left, low, right, high)
+    for pixel in pixels:
+        y, x = pixel // width, pixel % width
+        left, right, low, high = min(left, x), max(right, x), min(low, y), max(high, y)
+        if facets[y, x] >= 0:
+            drawn[facets[y, x]] = True
+    return left, low, max(right - left + 1, 0), max(high - low + 1, 0)
 
 
 @compiled
-def _stir(cells: NDArray[np.uint8], clip: NDArray[np.float64], faces: NDArray[np.int32], margin: float) -> None:
+def far_at(
+    pixels: NDArray[np.int32], depths: NDArray[np.float32], box: tuple[int, int, int, int]
+) -> NDArray[np.float32]:
+    """``depths`` (h, w) in a ``box`` that holds ``pixels``, where these are as far as can be."""
+    left, low, width, height = box
+    found = depths[low : low + height, left : left + width].copy()
+    for pixel in pixels:
+        found[pixel // depths.shape[1] - low, pixel % depths.shape[1] - left] = 1.0
+    return found
+
+
+@compiled
+def _stir(
+    cells: NDArray[np.uint8],
+    to_clip: NDArray[np.float64],
+    points: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    margin: float,
+) -> None:
     half = 0.5 * len(cells)
-    x, y = np.empty(len(clip)), np.empty(len(clip))
-    for i in range(len(clip)):
+    clip, x, y = np.empty((len(points), 3)), np.empty(len(points)), np.empty(len(points))
+    for i in range(len(points)):
+        for k in range(3):
+            row, point = to_clip[k], points[i]
+            clip[i, k] = row[0] * point[0] + row[1] * point[1] + row[2] * point[2] + row[3]
         w = max(clip[i, 2], LEAST_W)
         x[i], y[i] = half * (clip[i, 0] / w + 1.0), half * (clip[i, 1] / w + 1.0)
     for f in range(len(faces)):

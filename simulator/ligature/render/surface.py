@@ -6,6 +6,7 @@ Colours are 0..1 as displayed (sRGB); roughness and metallic 0..1 as in the meta
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +53,7 @@ class Surface:
         """Whether nothing behind shines through."""
         return self.colour.alpha >= 1.0
 
-    @property
+    @cached_property
     def defines(self) -> frozenset[str]:
         """Names of the shader features that it needs."""
         look = self.physical

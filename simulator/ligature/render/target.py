@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import moderngl
@@ -72,20 +73,39 @@ class Target:
         self.size, self.samples = size, samples
         self.passes = [name for name in PASSES if name in passes]
         self._textures = {name: context.texture(size, n, dtype=t) for name in self.passes for n, t in [PASSES[name]]}
-        self._depths = depth = context.depth_texture(size)
+        self._depths = context.depth_texture(size)
+
+    @cached_property
+    def whole(self) -> moderngl.Framebuffer:
+        """All passes."""
+        return self._context.framebuffer(list(self._textures.values()), self._depths)
+
+    @cached_property
+    def geometry(self) -> moderngl.Framebuffer | None:
+        """The passes besides colour."""
         rest = [self._textures[name] for name in self.passes if name != "rgb"]
-        self.geometry = context.framebuffer(rest, depth) if rest else None
-        self.whole = context.framebuffer(list(self._textures.values()), depth)
-        self._resolved: moderngl.Framebuffer | None = None
-        self.colour: moderngl.Framebuffer | None = None
-        self.behind: moderngl.Framebuffer | None = None
-        if "rgb" in self.passes:
-            self.behind = context.framebuffer([self._textures["rgb"]], depth)
-            self.colour = context.framebuffer([self._textures["rgb"]], context.depth_renderbuffer(size))
-            if samples:
-                self._resolved = self.colour
-                many = context.renderbuffer(size, 4, samples=samples)
-                self.colour = context.framebuffer([many], context.depth_renderbuffer(size, samples=samples))
+        return self._context.framebuffer(rest, self._depths) if rest else None
+
+    @cached_property
+    def behind(self) -> moderngl.Framebuffer | None:
+        """Colour, with the depths of all passes."""
+        return self._context.framebuffer([self._textures["rgb"]], self._depths) if "rgb" in self.passes else None
+
+    @cached_property
+    def colour(self) -> moderngl.Framebuffer | None:
+        """Colour, with depths of its own."""
+        if "rgb" not in self.passes:
+            return None
+        context = self._context
+        if not self.samples:
+            return context.framebuffer([self._textures["rgb"]], context.depth_renderbuffer(self.size))
+        many = context.renderbuffer(self.size, 4, samples=self.samples)
+        return context.framebuffer([many], context.depth_renderbuffer(self.size, samples=self.samples))
+
+    @cached_property
+    def _resolved(self) -> moderngl.Framebuffer:
+        """Where colours of several samples become one."""
+        return self._context.framebuffer([self._textures["rgb"]], self._context.depth_renderbuffer(self.size))
 
     def clear(self, background: tuple[float, float, float, float], apart: bool) -> None:
         """Empty what will be drawn into: ``colour`` and ``geometry`` when ``apart``, else the ``whole``."""
@@ -95,15 +115,18 @@ class Target:
         if colour is not None:
             colour.clear(*background)
 
-    def with_places(self, places: moderngl.Texture) -> moderngl.Framebuffer:
-        """The ``whole`` with one texture more."""
-        return self._context.framebuffer([*self._textures.values(), places], self._depths)
+    def with_more(self, *textures: moderngl.Texture) -> moderngl.Framebuffer:
+        """The ``whole`` with more textures."""
+        return self._context.framebuffer([*self._textures.values(), *textures], self._depths)
 
-    def fill(self, contents: Mapping[str, NDArray[Any]], depths: NDArray[np.float32]) -> None:
-        """Begin a picture with the ``contents`` and ``depths`` of another one."""
+    def fill(self, contents: Mapping[str, NDArray[Any]]) -> None:
+        """Begin a picture with the ``contents`` of another one."""
         for name, content in contents.items():
             self._textures[name].write(content)
-        self._depths.write(depths)
+
+    def fill_depths(self, depths: NDArray[np.float32], left: int, low: int) -> None:
+        """Set ``depths`` (h, w) from 0 to 1 of the ``whole`` from a pixel on, rows upwards."""
+        self._depths.write(depths, viewport=(left, low, depths.shape[1], depths.shape[0]), alignment=1)
 
     def contents(self) -> dict[str, NDArray[Any]]:
         """What is in the textures, for `fill`."""
@@ -120,7 +143,7 @@ class Target:
 
     def read(self) -> Readings:
         """Copy the picture out, as OpenGL keeps it."""
-        if self._resolved is not None and self.colour is not None:
+        if self.samples and self.colour is not None:
             self._context.copy_framebuffer(self._resolved, self.colour)
         return {name: self._array(name) for name in self.passes}
 

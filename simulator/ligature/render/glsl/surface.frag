@@ -82,6 +82,9 @@ layout(location = PASS_FLOW) out vec2 fFlow;
 #ifdef PASS_PLACES
 layout(location = PASS_PLACES) out vec4 fPlaces;
 #endif
+#ifdef PASS_FACETS
+layout(location = PASS_FACETS) out vec2 fFacet;
+#endif
 
 #ifdef MARKS
 uniform int uMarkCount;
@@ -250,6 +253,9 @@ void main() {
     if (vShadow[1].w > 0.0) fPlaces.zw = vShadow[1].xy / vShadow[1].w;
 #endif
 #endif
+#endif
+#ifdef PASS_FACETS
+    fFacet = vec2(float(vIds.y), float(gl_PrimitiveID));
 #endif
 #ifdef PASS_DEPTH
     fDepth = -eye.z;
