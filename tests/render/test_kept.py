@@ -161,6 +161,8 @@ def test_a_scene_of_arms_moving_anyhow_is_as_if_nothing_were_kept(seed: int) -> 
     simulation, random = ligature.Simulation(scene), np.random.default_rng(seed)
     state, movable = simulation.state.copy(), [k for k, body in enumerate(scene.bodies) if not body.static]
     views = [view_of(camera, state["camera_world"][0, camera.index], (200, 150)) for camera in scene.cameras[:2]]
+    wound = state["body_pose"][0, scene.needles[0].body, :3]
+    state["body_pose"][0, movable, :3] = wound + random.uniform(-0.05, 0.05, (len(movable), 3))
     moving = random.choice(movable, size=len(movable) // 2, replace=False)
     for _ in range(8):
         state["body_pose"][0, moving, :3] += random.normal(0.0, 0.005, (len(moving), 3))
