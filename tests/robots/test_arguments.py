@@ -65,6 +65,18 @@ def test_a_frame_has_a_name(arm: PsmArm, reference: Any) -> None:
         arm.set_base_frame([0, 0, 0, 0, 0, 0, 1], reference)
 
 
+@pytest.mark.parametrize("method", [None, 3, "nope", "_check_running", "servo cp", "name", ["servo_cp"]])
+def test_what_is_no_command_is_carried_out_by_nobody(arm: PsmArm, method: Any) -> None:
+    with pytest.raises(Rejected, match="direct takes the name of a command, such as 'servo_cp', not "):
+        arm.direct(method)
+
+
+@pytest.mark.parametrize("stiffness", [None, 3.0, np.eye(3), {"gains": 1}])
+def test_an_impedance_is_one(arm: PsmArm, stiffness: Any) -> None:
+    with pytest.raises(Rejected, match="servo_ci takes a CartesianImpedance, not "):
+        arm.servo_ci(stiffness)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_base_is_so_near_that_a_pose_keeps_its_digits(seed: int) -> None:
     rng, arm = np.random.default_rng(seed), homed()

@@ -175,8 +175,11 @@ class Arm(Device):
         The arm is enabled where it stands and need not be homed; the tip may begin anywhere and keeps no depth, poses
         are in the base. Joints are clipped to their limits all the same.
 
-        Raises `Rejected` when the arm rejects the motion.
+        Raises `Rejected` when the arm rejects the motion, and for a ``method`` that is none of its commands.
         """
+        known = isinstance(method, str) and not method.startswith("_")
+        if not (known and callable(getattr(type(self), method, None))):
+            raise Rejected(f"direct takes the name of a command, such as 'servo_cp', not {reprlib.repr(method)}")
         self.take_over()
         self._direct = True
         try:
@@ -417,6 +420,8 @@ class Arm(Device):
 
     def servo_ci(self, stiffness: CartesianImpedance) -> None:
         """Yield like springs and dampers around a pose; see `CartesianImpedance`."""
+        if not isinstance(stiffness, CartesianImpedance):
+            raise Rejected(f"servo_ci takes a CartesianImpedance, not {reprlib.repr(stiffness)}")
         self._push_with("servo_ci", stiffness)
 
     def servo_cs(self, pose: ArrayLike | None, twist: ArrayLike | None, wrench: ArrayLike | None) -> None:
