@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import copy
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from ligature import load
 from ligature.adf import Resolver, Severity, read_any
 from ligature.adf.writer import write_document
 from ligature.authoring.lint import OF_LOADING, READER, RULES, Finding, lint
+from ligature.authoring.lint.joints import thread_elements
+from ligature.authoring.lint.subject import Subject
 from ligature.authoring.objfile import Paint, Surface, obj_texts
 from ligature.authoring.shapes import Shape, shape_mesh
 from ligature.cli.main import app
@@ -143,6 +147,48 @@ def test_a_needle_on_a_thread_may_weigh_what_it_likes(model, elements: int, opte
     changes |= {"": {}, "body": {f"{names[1]}/ligature rod": False}, "file": {"ligature rod": False}}[opted_out]
     found = [finding.key for finding in model(changes) if finding.rule == "mass-ratio"]
     assert found == ([] if elements >= 4 and not opted_out else ["JOINT tail"])
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_elements_of_threads_are_those_that_a_scene_has(tmp_path: Path, seed: int) -> None:
+    """Chains with branches, rings, gaps, other shapes and joints, opted out in part: both readers agree."""
+    random = np.random.default_rng(seed)
+    names = [f"BODY t{n}" for n in range(random.integers(2, 16))]
+    shapes: dict[str, dict[str, float]] = {
+        "CAPSULE": {"radius": 0.001, "height": 0.01},
+        "SPHERE": {"radius": 0.004},
+        "BOX": dict.fromkeys("xyz", 0.01),
+    }
+    wide = {**SIX, "linear": {"low": ZERO, "high": UP}}
+    rarely = random.uniform(0.0, 0.3)  # how often something is unlike a thread
+    values: dict[str, Any] = {"bodies": names, "namespace": "/x/"}
+    for n, name in enumerate(names):
+        shape = random.choice(list(shapes), p=[1 - rarely, 2 * rarely / 3, rarely / 3])
+        values[name] = {
+            "name": name[5:], "mass": 0.0 if random.random() < rarely / 3 else 1e-4, "collision shape": str(shape),
+            "collision geometry": shapes[shape], "location": {"position": {**ZERO, "z": 0.01 * n}},
+        } | ({"ligature rod": False} if random.random() < rarely / 3 else {})  # fmt: skip
+    pairs = [(n, n + 1) for n in range(len(names) - 1) if random.random() > rarely / 3]
+    regular = len(pairs)
+    pairs += [tuple(random.choice(len(names), 2, replace=False)) for _ in range(random.poisson(rarely))]
+    for k, (a, b) in enumerate(pairs):
+        parent, child, pivot = (b, a, -0.005) if random.random() < rarely else (a, b, 0.005)
+        if k >= regular:
+            pivot *= random.uniform(0.1, 0.9)  # two joints at one place would leave an element no length
+        values[f"JOINT s{k}"] = {
+            "name": f"s{k}", "parent": names[parent], "child": names[child],
+            "type": "revolute" if random.random() < rarely / 4 else "six dof spring",
+            "joint limits": wide if random.random() < rarely / 4 else SIX,
+            "parent pivot": {**ZERO, "z": pivot}, "child pivot": {**ZERO, "z": -pivot},
+            "stiffness": {"linear": ZERO, "angular": UP}, "parent axis": UP, "child axis": UP,
+        } | ({"ligature rod": False} if random.random() < rarely / 4 else {})  # fmt: skip
+    values["joints"] = [key for key in values if key.startswith("JOINT")]
+    path = tmp_path / "m.yaml"
+    path.write_text(json.dumps(values))
+    scene = load(path)
+    simulated = {scene.bodies[body].identity.key for rod in scene.rods for body in rod.bodies}
+    resolver = Resolver([tmp_path])
+    assert thread_elements(Subject(read_any(path, resolver), resolver)) == simulated
 
 
 @pytest.mark.parametrize("scale", [0.01, 50.0])

@@ -62,18 +62,21 @@ def thread_elements(subject: Subject) -> set[str]:
     """Keys of the bodies that a scene will simulate as elements of threads: see `ligature.model.rods`."""
     if not subject.document.top.flag("ligature rod"):
         return set()
-    round_bodies = {key for key, body in subject.bodies.items() if body.flag("ligature rod") and _round(subject, body)}
-    neighbours: dict[str, set[str]] = {}
-    for joint, parent, child in _ends(subject):
-        if {parent.key, child.key} <= round_bodies and joint.flag("ligature rod") and _bends(joint):
-            neighbours.setdefault(parent.key, set()).add(child.key)
-            neighbours.setdefault(child.key, set()).add(parent.key)
+    ends = list(_ends(subject))
+    out = {body.key for joint, *bodies in ends if not joint.flag("ligature rod") for body in bodies}
+    fit = {key for key, body in subject.bodies.items() if body.flag("ligature rod") and _round(subject, body)} - out
+    neighbours: dict[str, list[str]] = {}
+    for joint, parent, child in ends:
+        if {parent.key, child.key} <= fit and _bends(joint):
+            neighbours.setdefault(parent.key, []).append(child.key)
+            neighbours.setdefault(child.key, []).append(parent.key)
     elements: set[str] = set()
     for start, beside in neighbours.items():
-        chain, ahead = [start], beside if len(beside) == 1 else set()
+        chain, ahead = [start], beside if len(beside) == 1 else []
         while len(ahead) == 1:
             chain += ahead
-            ahead = neighbours[chain[-1]] - set(chain)
+            beside = neighbours[chain[-1]]
+            ahead = [key for key in beside if key not in chain] if len(beside) <= 2 else []
         if len(chain) >= LEAST_ELEMENTS:
             elements |= set(chain)
     return elements
