@@ -27,7 +27,7 @@ MOST, MOST_PIXELS = 8, 4_200_000
 """Pictures that are kept, of all cameras together, and their pixels, of which each takes 28 bytes; with more cameras
 that take turns, none would be there any more when it is needed, and none is kept."""
 
-MARKED = ("places", "facets")
+NOTED = ("places", "facets")
 """Further passes of a picture that is kept: where it reads the shadow maps, and which facet is seen."""
 
 NO_PIXELS = np.zeros(0, dtype=np.int32)

@@ -124,7 +124,7 @@ def _strong(
     ``along`` and ``across`` are the contrasts of edges that lie and stand, or ``turned``, that stand and lie.
     """
     width, kept = along.shape[1], 0
-    rows, columns = along.shape[::-1] if turned else along.shape
+    rows = along.shape[1] if turned else along.shape[0]
     found = np.empty_like(places)
     for place in places:
         y, x = (place % width, place // width) if turned else (place // width, place % width)

@@ -14,7 +14,7 @@ from ligature.model.state import MAX_PUNCTURES
 from ligature.render import legacy
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
-from ligature.render.kept import MARKED, Begun, is_still
+from ligature.render.kept import NOTED, Begun, is_still
 from ligature.render.lights import Lights
 from ligature.render.programs import Program, Programs
 from ligature.render.sky import Sky
@@ -77,7 +77,7 @@ class Brushes:
             defines["DEFORMS"] = 1
         if batch.rays is not None:
             defines |= batch.rays.defines
-        if batch.primitive is not None and set(passes) - set(MARKED) != {"rgb"}:
+        if batch.primitive is not None and set(passes) - set(NOTED) != {"rgb"}:
             defines["ANALYTIC"] = batch.primitive[0]
         return defines
 

@@ -22,7 +22,7 @@ from ligature.model.shapes import ShaderFiles
 from ligature.render.batches import Batch, Instances, Seen
 from ligature.render.camera import CameraView
 from ligature.render.context import create_context, depth_copier, draws_on_processor, finish_of
-from ligature.render.kept import MARKED, Keeper, Kept, is_still
+from ligature.render.kept import NOTED, Keeper, Kept, is_still
 from ligature.render.lights import Lights, LightSettings, ShadowView
 from ligature.render.look import Look, brighter, tinted
 from ligature.render.movement import Movement
@@ -355,7 +355,7 @@ class Renderer:
                 self._cast_shadows(view, None)
             buffer.clear()
             blank.clear(BACKGROUND, apart=False)
-            painter.paint_opaque(buffer, [*target.passes, *MARKED], only=keepable)
+            painter.paint_opaque(buffer, [*target.passes, *NOTED], only=keepable)
 
         picture = view.view.tobytes(), view.projection.tobytes()
         return self._keeper.kept(target, picture, keepable, self._instances, draw)
