@@ -47,7 +47,7 @@ class Begun:
 
     kept: frozenset[Batch] = frozenset()
     again: Mapping[Batch, NDArray[np.int32]] = field(default_factory=dict)
-    box: Box | None = None
+    box: Box = (0, 0, 0, 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -213,11 +213,11 @@ class _ShadowMap:
     def __init__(self, context: moderngl.Context, size: int) -> None:
         self.size = size
         self.spread = 0.0
-        self.texture, self._still = (context.depth_texture((size, size)) for _ in range(2))
+        self.texture, still = (context.depth_texture((size, size)) for _ in range(2))
         self.texture.compare_func = "<="
         self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.texture.repeat_x = self.texture.repeat_y = False
-        self._whole, self._standing = (context.framebuffer(depth_attachment=t) for t in (self.texture, self._still))
+        self._whole, self._standing = (context.framebuffer(depth_attachment=t) for t in (self.texture, still))
         self._copy = depth_copier(context)
         self._shows: tuple[Hashable, ...] = ()
         self._stands: tuple[Hashable, ...] = ()

@@ -175,7 +175,7 @@ class Painter:
             if batch not in self._begun.kept:
                 self._draw(batch, passes, rows, shaders)
             elif (faces := self._begun.again.get(batch)) is not None:
-                buffer.scissor = self._begun.box  # type: ignore[assignment]
+                buffer.scissor = self._begun.box
                 self._draw(batch, passes, rows, shaders, faces)
                 buffer.scissor = None  # type: ignore[assignment]
 
