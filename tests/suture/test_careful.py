@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from ligature.model.shapes import Cylinder
+from ligature.model.shapes import Box, Cylinder
 from ligature.suture.careful import UNCHANGED, advance_carefully
 from ligature.suture.contacts import detect
 from ligature.suture.layout import Touches
@@ -175,3 +175,23 @@ def test_careful_steps_converge_for_nearly_all_threads() -> None:
     # What does not converge in a whole tick is divided by `run_tick`.
     assert sum(settled for _, settled, _ in ends) >= 90
     assert np.median([solves for solves, _, _ in ends]) < 40
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    n=st.integers(10, 60), thick=st.floats(0.2e-3, 1e-3), friction=st.floats(0.05, 1.0), speed=st.floats(0.05, 5.0)
+)  # fmt: skip
+def test_contacts_that_all_lift_off_do_not_keep_a_careful_step_busy(
+    n: int, thick: float, friction: float, speed: float
+) -> None:
+    """Friction limits that are halved again and again never become nothing: such steps took all 150 solves."""
+    points = np.column_stack([np.linspace(0.0, 2.0 * thick * n, n + 1), np.zeros(n + 1), np.full(n + 1, 0.49 * thick)])
+    bench = Bench([body(0, Box((1.0, 1.0, 0.02)), (0.0, 0.0, -0.01), friction=1.0)])
+    rod = bench.add(from_material(points, thick, 1e7, 1100.0, gravity=(0, 0, -9.81), friction=friction))
+    bench.step(3)
+    assume(rod._touches[0].press[: rod._touches[0].count[0]].any())
+    rod.nodes.v[rod.first : rod.first + n] = 0.0, 0.0, speed
+    solves, settled, touches = step_carefully(bench, rod)
+    assert touches.press[: touches.count[0]].max() < 1e-9
+    assert settled
+    assert solves <= 15

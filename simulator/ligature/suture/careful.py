@@ -38,6 +38,9 @@ UNCHANGED, UNFELT = 0.02, 5e-4
 """Error of a friction limit, as a share of its own, up to which Coulomb's law counts as met; and as one of the largest,
 which counts for nothing."""
 
+NOTHING = 1e-12
+"""Depth of a contact, metres, whose force counts as none: some per cent of an element's weight, and above rounding."""
+
 RELAXATION = 0.5
 """Share of the way to the friction limits that a minimum asks for, by which the next one's go."""
 
@@ -198,7 +201,7 @@ def in_balance(touches: Touches, work: Work, stiffness: float) -> bool:
         fx, fy, fz = _force(touches, work, c, u[0], u[1], u[2], stiffness)
         error = max(error, abs(fx - held[0]), abs(fy - held[1]), abs(fz - held[2]))
         largest = max(largest, abs(fx), abs(fy), abs(fz))
-    return error <= BALANCED * largest
+    return error <= BALANCED * max(largest, NOTHING * stiffness)
 
 
 @kernel
@@ -213,12 +216,15 @@ def settle_limits(touches: Touches, work: Work, stiffness: float) -> bool:
         touches.press[c] = max(-stiffness * room, 0.0)
         limit = touches.friction[c] * touches.press[c]
         error, largest = max(error, abs(limit - work.limit[c]) - UNCHANGED * limit), max(largest, limit)
-    if error <= UNFELT * largest:
+    none = NOTHING * stiffness
+    if error <= UNFELT * max(largest, none):
         return True
+    # Where nothing presses any more the limits go at once: halves of them would long count as something.
+    share = RELAXATION if largest > none else 1.0
     for c in range(touches.count[0]):
         if not touches.bilateral[c]:
             limit = touches.friction[c] * touches.press[c]
-            work.limit[c] += RELAXATION * (limit - work.limit[c])
+            work.limit[c] += share * (limit - work.limit[c])
     return False
 
 
