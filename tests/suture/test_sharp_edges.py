@@ -54,6 +54,6 @@ def test_a_thread_drawn_over_an_edge_stays_on_it(
     bench = WithExclusions([body(0, shape, friction=0.3)])
     bench.laid(elements, thickness)
     # One that had come through the edge would bear nothing. What sawing leaves varies: 0.4 to 3.5 of 0.07 to 0.2 N.
-    assert bench.drawn(tension, saw) > 0.3 * tension
+    assert bench.drawn(tension, saw) > (0.3 if saw else 0.5) * tension
     places = bench.rod.positions
     assert places[np.abs(places[:, 0]).argmin(), 2] > TOP - 6e-3

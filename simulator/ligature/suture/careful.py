@@ -39,7 +39,8 @@ UNCHANGED, UNFELT = 0.02, 5e-4
 which counts for nothing."""
 
 NOTHING = 1e-12
-"""Depth of a contact, metres, whose force counts as none: some per cent of an element's weight, and above rounding."""
+"""Depth of a contact, metres, by whose force errors count where the largest is less, 0.13 µN for a thread of 0.3 mm:
+nothing is small against the force of contacts that have all lifted off."""
 
 RELAXATION = 0.5
 """Share of the way to the friction limits that a minimum asks for, by which the next one's go."""
@@ -219,7 +220,7 @@ def settle_limits(touches: Touches, work: Work, stiffness: float) -> bool:
     none = NOTHING * stiffness
     if error <= UNFELT * max(largest, none):
         return True
-    # Where nothing presses any more the limits go at once: halves of them would long count as something.
+    # Where nothing presses any more the limits go at once: halved, they would count for many solves.
     share = RELAXATION if largest > none else 1.0
     for c in range(touches.count[0]):
         if not touches.bilateral[c]:
